@@ -1,0 +1,40 @@
+"""The five acceleration methods: their native names, labels and descriptions. No bpy."""
+
+from typing import NamedTuple
+
+
+class Method(NamedTuple):
+    """One way of building an accelerator. `name` is the native name, the same in properties, reports and commands."""
+
+    name: str
+    label: str
+    description: str
+
+
+METHODS: tuple[Method, ...] = (
+    Method(
+        "bvh-median",
+        "BVH (Median Split)",
+        "Bounding volume hierarchy split at the median triangle, the axis cycling through X, Y and Z",
+    ),
+    Method("bvh-sah", "BVH (SAH)", "Bounding volume hierarchy split where the surface area heuristic expects least work"),
+    Method("grid", "Uniform Grid", "One uniform grid of cells over the whole scene"),
+    Method(
+        "hybrid-sampled",
+        "Hybrid (Sampled)",
+        "Bounding volume hierarchy whose evenly filled nodes, found with sample rays, become uniform grids",
+    ),
+    Method(
+        "hybrid-cost",
+        "Hybrid (Cost)",
+        "Bounding volume hierarchy whose nodes become grids where measured cost for the expected rays is lower",
+    ),
+)
+
+METHOD_NAMES: tuple[str, ...] = tuple(method.name for method in METHODS)
+DEFAULT_METHOD = "hybrid-sampled"
+
+
+def label(name: str) -> str:
+    """The label of a method's native name; a name that is no method is its own label."""
+    return next((method.label for method in METHODS if method.name == name), name)
