@@ -1,0 +1,67 @@
+# Espalier's commands; `make` alone lists them. They need Python 3.11, Rust and make; the rest goes into .venv.
+
+PYTHON     ?= $(shell command -v python3.11 || command -v python3)
+INPUT      ?= suzanne
+RESOLUTION ?= 1000x1000
+OUT        ?= out/demo
+
+BIN        := .venv/bin
+CARGO      := cd native && cargo
+NATIVE     := $(shell find native -name target -prune -o -type f -print)
+EXTENSION  := $(shell find addon scenes -name __pycache__ -prune -o -type f -print) blender_manifest.toml LICENSE
+PORTABLE   := $(if $(filter Linux,$(shell uname)),--zig --compatibility manylinux_2_28)
+VERSION    := $(shell sed -n 's/^version = "\(.*\)"/\1/p' blender_manifest.toml)
+ZIP        := dist/espalier-$(VERSION).zip
+
+.PHONY: help demo test check format bench package clean
+.DELETE_ON_ERROR:
+
+help: ## List these commands
+	@sed -n 's/^\([a-z]*\):.*## \(.*\)/make \1#\2/p' Makefile | column -t -s '#'
+
+demo: .venv/ready ## Trace a scene with every method and with Cycles: make demo [INPUT=file-or-scene-name]
+	$(BIN)/espalier compare "$(INPUT)" --resolution $(RESOLUTION) --cycles --out $(OUT)
+
+test: .venv/ready ## Run every test that needs no installed Blender
+	$(CARGO) test --release --workspace
+	$(BIN)/pytest tests/python
+	$(BIN)/pytest tests/headless
+
+check: .venv/ready ## Check form, lints and types of Rust and Python
+	$(CARGO) fmt --all --check
+	$(CARGO) clippy --release --workspace --all-targets -- -D warnings
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+
+format: .venv/tools ## Put Rust and Python into the form that `make check` wants
+	$(CARGO) fmt --all
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+bench: .venv/ready ## Measure every benchmark in tests/bench and record the results
+	$(BIN)/python tests/bench/run.py
+
+package: $(ZIP) ## Make the extension's zip in dist/, as Blender installs it
+
+clean: ## Remove everything that these commands made
+	rm -rf .venv dist out native/target
+
+.venv/tools: .ci/requirements.txt
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11) and "Espalier needs Python 3.11; set PYTHON=...")'
+	$(PYTHON) -m venv .venv
+	$(BIN)/pip install --quiet --disable-pip-version-check -r .ci/requirements.txt
+	touch $@
+
+.venv/wheel: .venv/tools $(NATIVE)
+	rm -rf dist/wheels
+	$(BIN)/maturin build --release --manifest-path native/python/Cargo.toml $(PORTABLE) --out dist/wheels
+	touch $@
+
+.venv/ready: .venv/wheel pyproject.toml
+	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --force-reinstall dist/wheels/*.whl
+	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	touch $@
+
+$(ZIP): .venv/wheel .ci/package.py $(EXTENSION)
+	$(BIN)/python .ci/package.py $@
