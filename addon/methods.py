@@ -17,7 +17,9 @@ METHODS: tuple[Method, ...] = (
         "BVH (Median Split)",
         "Bounding volume hierarchy split at the median triangle, the axis cycling through X, Y and Z",
     ),
-    Method("bvh-sah", "BVH (SAH)", "Bounding volume hierarchy split where the surface area heuristic expects least work"),
+    Method(
+        "bvh-sah", "BVH (SAH)", "Bounding volume hierarchy split where the surface area heuristic expects least work"
+    ),
     Method("grid", "Uniform Grid", "One uniform grid of cells over the whole scene"),
     Method(
         "hybrid-sampled",

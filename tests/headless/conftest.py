@@ -21,7 +21,7 @@ def addon() -> Iterator[None]:
 
 
 @pytest.fixture
-def scene() -> Iterator["bpy.types.Scene"]:
+def scene() -> "bpy.types.Scene":
     """A scene with no object, from factory settings; the add-on stays registered."""
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
-    yield bpy.context.scene
+    return bpy.context.scene
