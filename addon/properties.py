@@ -1,14 +1,15 @@
-"""Settings and results of Espalier, kept on the scene as `scene.espalier`."""
+"""Settings of Espalier, kept on the scene as `scene.espalier`."""
+
+from typing import Any
 
 import bpy
 from bpy.props import (
     BoolProperty,
-    CollectionProperty,
     EnumProperty,
     FloatProperty,
+    FloatVectorProperty,
     IntProperty,
     PointerProperty,
-    StringProperty,
 )
 
 from .methods import DEFAULT_METHOD, METHOD_NAMES, METHODS
@@ -19,21 +20,92 @@ STATIC: set[str] = set()
 """Property options of a setting that cannot be animated."""
 
 
-class ESPALIER_PG_result(bpy.types.PropertyGroup):
-    """One row of the results table. Counts are floats because Blender's integers end at 2^31."""
+def color(name: str, description: str, default: tuple[float, float, float]) -> Any:
+    """A colour setting as the screen shows it, in sRGB."""
+    return FloatVectorProperty(
+        name=name,
+        description=description,
+        default=default,
+        min=0.0,
+        max=1.0,
+        size=3,
+        subtype="COLOR_GAMMA",
+        options=STATIC,
+    )
 
-    method: StringProperty(name="Method", description="Native name of the acceleration method, or 'cycles'")
-    build_ms: FloatProperty(name="Build", description="Time to build the accelerator, in milliseconds", min=0.0)
-    trace_s: FloatProperty(name="Trace", description="Time to trace all rays of the frame, in seconds", min=0.0)
-    mrays_per_s: FloatProperty(name="Mrays/s", description="Million rays traced per second", min=0.0)
-    bytes: FloatProperty(name="Memory", description="Memory of the accelerator, in bytes", min=0.0)
-    nodes: FloatProperty(name="Nodes", description="Number of branches and leaves of the tree", min=0.0)
-    grids: FloatProperty(name="Grids", description="Number of uniform grids in the tree", min=0.0)
-    cells: FloatProperty(name="Cells", description="Number of grid cells, empty ones included", min=0.0)
+
+class ESPALIER_PG_overlay(bpy.types.PropertyGroup):
+    """What the overlay draws. The colours keep apart with any colour vision, and stand out on dark and light themes."""
+
+    show: BoolProperty(
+        name="Show Cells",
+        description="Draw the boxes of the accelerator last built over the 3D viewport",
+        default=True,
+        options=STATIC,
+    )
+    method: EnumProperty(
+        name="Method",
+        description="Acceleration method whose boxes are drawn, once it is built",
+        items=METHOD_ITEMS,
+        default=DEFAULT_METHOD,
+        options=STATIC,
+    )
+    branches: BoolProperty(name="Branches", description="Draw the boxes of inner nodes", default=False, options=STATIC)
+    leaves: BoolProperty(
+        name="Leaves", description="Draw the boxes of nodes that hold triangles", default=True, options=STATIC
+    )
+    grids: BoolProperty(name="Grids", description="Draw the outer boxes of uniform grids", default=True, options=STATIC)
+    cells: BoolProperty(name="Grid Cells", description="Draw the cells of uniform grids", default=True, options=STATIC)
+    branch_color: color("Branch Color", "Color of the boxes of inner nodes", (0.95, 0.95, 0.95))
+    leaf_color: color("Leaf Color", "Color of the boxes of nodes that hold triangles", (0.25, 0.69, 1.0))
+    grid_color: color("Grid Color", "Color of the outer boxes of uniform grids", (1.0, 0.48, 0.72))
+    cell_color: color("Grid Cell Color", "Color of the cells of uniform grids", (1.0, 0.76, 0.04))
+    depth_min: IntProperty(
+        name="Depth Min",
+        description="Least depth in the tree of boxes to draw; the root has depth 0",
+        default=0,
+        min=0,
+        max=65535,
+        soft_max=64,
+        options=STATIC,
+    )
+    depth_max: IntProperty(
+        name="Depth Max",
+        description="Greatest depth in the tree of boxes to draw; the root has depth 0",
+        default=64,
+        min=0,
+        max=65535,
+        soft_max=64,
+        options=STATIC,
+    )
+    occupied_only: BoolProperty(
+        name="Occupied Only", description="Leave out boxes that hold no triangle", default=True, options=STATIC
+    )
+    in_front: BoolProperty(
+        name="In Front", description="Draw the boxes in front of all objects", default=False, options=STATIC
+    )
+    opacity: FloatProperty(
+        name="Opacity",
+        description="Opacity of the boxes",
+        default=0.5,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+        options=STATIC,
+    )
+    max_boxes: IntProperty(
+        name="Max Boxes",
+        description="Most boxes to draw; beyond it the deepest are left out",
+        default=100_000,
+        min=1,
+        soft_max=1_000_000,
+        max=10_000_000,
+        options=STATIC,
+    )
 
 
 class ESPALIER_PG_settings(bpy.types.PropertyGroup):
-    """How Espalier traces this scene, what its overlay draws, and the results of the last run."""
+    """How Espalier traces this scene, and what its overlay draws."""
 
     method: EnumProperty(
         name="Method",
@@ -89,72 +161,10 @@ class ESPALIER_PG_settings(bpy.types.PropertyGroup):
         soft_max=32,
         max=1024,
     )
-    overlay_show: BoolProperty(
-        name="Show Cells",
-        description="Draw the boxes of the accelerator last built over the 3D viewport",
-        default=False,
-        options=STATIC,
-    )
-    overlay_branches: BoolProperty(
-        name="Branches", description="Draw the boxes of inner nodes", default=False, options=STATIC
-    )
-    overlay_leaves: BoolProperty(
-        name="Leaves", description="Draw the boxes of nodes that hold triangles", default=True, options=STATIC
-    )
-    overlay_grids: BoolProperty(
-        name="Grids", description="Draw the outer boxes of uniform grids", default=True, options=STATIC
-    )
-    overlay_cells: BoolProperty(
-        name="Grid Cells", description="Draw the cells of uniform grids", default=True, options=STATIC
-    )
-    overlay_depth_min: IntProperty(
-        name="Depth Min",
-        description="Least depth in the tree of boxes to draw; the root has depth 0",
-        default=0,
-        min=0,
-        max=65535,
-        soft_max=64,
-        options=STATIC,
-    )
-    overlay_depth_max: IntProperty(
-        name="Depth Max",
-        description="Greatest depth in the tree of boxes to draw; the root has depth 0",
-        default=64,
-        min=0,
-        max=65535,
-        soft_max=64,
-        options=STATIC,
-    )
-    overlay_occupied_only: BoolProperty(
-        name="Occupied Only", description="Leave out boxes that hold no triangle", default=True, options=STATIC
-    )
-    overlay_opacity: FloatProperty(
-        name="Opacity",
-        description="Opacity of the boxes",
-        default=0.5,
-        min=0.0,
-        max=1.0,
-        subtype="FACTOR",
-        options=STATIC,
-    )
-    overlay_max_boxes: IntProperty(
-        name="Max Boxes",
-        description="Most boxes to draw; beyond it the deepest are left out",
-        default=100_000,
-        min=1,
-        soft_max=1_000_000,
-        max=10_000_000,
-        options=STATIC,
-    )
-    results: CollectionProperty(
-        type=ESPALIER_PG_result, name="Results", description="One row for each method of the last run"
-    )
-    results_index: IntProperty(
-        name="Result", description="Selected row of the results table", default=0, min=0, options=STATIC
-    )
+    overlay: PointerProperty(type=ESPALIER_PG_overlay, name="Overlay", description="What is drawn over the 3D viewport")
 
 
-CLASSES = (ESPALIER_PG_result, ESPALIER_PG_settings)
+CLASSES = (ESPALIER_PG_overlay, ESPALIER_PG_settings)
 
 
 def register() -> None:
@@ -162,7 +172,7 @@ def register() -> None:
     for cls in CLASSES:
         bpy.utils.register_class(cls)
     bpy.types.Scene.espalier = PointerProperty(
-        type=ESPALIER_PG_settings, name="Espalier", description="Settings and results of Espalier"
+        type=ESPALIER_PG_settings, name="Espalier", description="Settings of Espalier"
     )
 
 

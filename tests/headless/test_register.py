@@ -15,7 +15,7 @@ def test_settings_are_on_the_scene(scene):
 
 
 def test_every_setting_has_a_tooltip(scene):
-    for group in (scene.espalier, scene.espalier.results.add()):
+    for group in (scene.espalier, scene.espalier.overlay):
         for name, prop in group.bl_rna.properties.items():
             if name not in {"rna_type", "name"}:
                 assert prop.description, f"{name} has no description"
