@@ -70,6 +70,8 @@ def blender_extension(*arguments: str) -> None:
 
 def main() -> None:
     archive = Path(sys.argv[1]).resolve()
+    for former in archive.parent.glob("espalier-*.zip"):
+        former.unlink()
     stage()
     blender_extension("validate", str(STAGE))
     blender_extension("build", "--source-dir", str(STAGE), "--output-filepath", str(archive))
