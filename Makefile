@@ -23,13 +23,13 @@ demo: .venv/ready ## Trace a scene with every method and with Cycles: make demo 
 	$(BIN)/espalier compare "$(INPUT)" --resolution $(RESOLUTION) --cycles --out $(OUT)
 
 test: .venv/ready ## Run every test that needs no installed Blender
-	$(CARGO) test --release --workspace
+	$(CARGO) test --workspace
 	$(BIN)/pytest tests/python
 	$(BIN)/pytest tests/headless
 
 check: .venv/ready ## Check form, lints and types of Rust and Python
 	$(CARGO) fmt --all --check
-	$(CARGO) clippy --release --workspace --all-targets -- -D warnings
+	$(CARGO) clippy --workspace --all-targets -- -D warnings
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
@@ -55,7 +55,7 @@ clean: ## Remove everything that these commands made
 
 .venv/wheel: .venv/tools $(NATIVE)
 	rm -rf dist/wheels
-	$(BIN)/maturin build --release --manifest-path native/python/Cargo.toml $(PORTABLE) --out dist/wheels
+	. $(BIN)/activate && maturin build --release --manifest-path native/python/Cargo.toml $(PORTABLE) --out dist/wheels
 	touch $@
 
 .venv/ready: .venv/wheel pyproject.toml

@@ -3,7 +3,6 @@
 import sys
 from pathlib import Path
 
-import addon_utils
 import bpy
 import numpy as np
 
@@ -35,9 +34,9 @@ def main() -> None:
     assert np.isfinite(picture).all()
     cube, corner = picture[12, 16, :3], picture[0, 0, :3]
     assert np.abs(cube - corner).max() > 0.01, f"the cube {cube} stands out from the world {corner}"
-    addon_utils.disable(MODULE)
+    bpy.ops.preferences.addon_disable(module=MODULE)
     assert not hasattr(bpy.types.Scene, "espalier")
-    assert not [name for name in dir(bpy.types) if name.startswith("ESPALIER")]
+    assert "ESPALIER" not in {cls.bl_idname for cls in bpy.types.RenderEngine.__subclasses__() if cls.is_registered}
     print(f"bpy {bpy.app.version_string}: installed, rendered, disabled")
 
 

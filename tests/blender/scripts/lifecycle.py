@@ -1,38 +1,43 @@
 """Run in Blender: disables and enables the installed extension again and again; nothing of it may stay behind."""
 
-import sys
 import threading
 
-import addon_utils
 import bpy
 
 MODULE = "bl_ext.user_default.espalier"
+BASES = ("AddonPreferences", "Header", "Menu", "Operator", "Panel", "PropertyGroup", "RenderEngine", "UIList")
+
+
+def registered() -> list[str]:
+    """Names of the extension's classes that Blender knows; `dir(bpy.types)` would leave out the property groups."""
+    bases = (getattr(bpy.types, name) for name in BASES)
+    classes = (cls for base in bases for cls in base.__subclasses__())
+    return sorted(cls.__name__ for cls in classes if cls.__module__.startswith(MODULE) and cls.is_registered)
+
+
+def handlers() -> list[str]:
+    """Modules of the extension whose functions Blender would call on an event."""
+    lists = (found for name in dir(bpy.app.handlers) if isinstance(found := getattr(bpy.app.handlers, name), list))
+    modules = (function.__module__ for functions in lists for function in functions)
+    return [module for module in modules if module.startswith(MODULE)]
 
 
 def traces() -> list[str]:
-    """What of the extension Blender knows right now: classes, scene properties, handlers, timers, threads."""
-    classes = [name for name in dir(bpy.types) if name.startswith("ESPALIER")]
-    engines = [cls.__name__ for cls in bpy.types.RenderEngine.__subclasses__() if cls.is_registered]
+    """What of the extension is in Blender right now: classes, handlers, scene properties, threads."""
     properties = [name for name in dir(bpy.types.Scene) if name == "espalier"]
-    handlers = [
-        function.__module__
-        for name in dir(bpy.app.handlers)
-        if isinstance(found := getattr(bpy.app.handlers, name), list)
-        for function in found
-        if function.__module__.startswith(MODULE)
-    ]
     threads = [thread.name for thread in threading.enumerate() if "espalier" in thread.name.lower()]
-    return classes + [name for name in engines if "ESPALIER" in name] + properties + handlers + threads
+    return registered() + handlers() + properties + threads
 
 
 def main() -> None:
-    assert "ESPALIER_PG_settings" in traces(), "the extension is not enabled after its installation"
+    installed = traces()
+    assert "ESPALIER_PG_settings" in installed, "the extension is not enabled after its installation"
     for _ in range(3):
-        addon_utils.disable(MODULE)
+        bpy.ops.preferences.addon_disable(module=MODULE)
         assert traces() == [], f"left behind: {traces()}"
-        addon_utils.enable(MODULE)
-        assert "ESPALIER_PG_settings" in traces()
-    print("lifecycle ok", file=sys.stdout)
+        bpy.ops.preferences.addon_enable(module=MODULE)
+        assert traces() == installed
+    print("lifecycle ok")
 
 
 main()
