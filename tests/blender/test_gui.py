@@ -18,10 +18,14 @@ from .desktop import Desktop, wait_until
 
 ROOT = Path(__file__).resolve().parents[2]
 MODULE = "bl_ext.user_default.espalier"
-SESSION = f"""
+METHODS = ["bvh-median", "bvh-sah", "grid", "hybrid-sampled", "hybrid-cost"]
+ROWS = f"""
 import importlib
 session = importlib.import_module("{MODULE}.session").of(window.scene)
+results = session.run.results if session else ()
+value = [[result.method, result.build_ms, result.trace_s, result.rays] for result in results]
 """
+THREADS = "import threading\nvalue = [thread.name for thread in threading.enumerate()]"
 SNAPSHOT = f"""
 import sys
 sys.path.insert(0, {str(ROOT / "tests" / "blender" / "scripts")!r})
@@ -59,10 +63,8 @@ def modal(desktop: Desktop) -> list[str]:
 
 
 def press(desktop: Desktop, operator: str) -> None:
-    """Click the button of the operator, and see it start."""
+    """Click the button of the operator, as found with the mouse."""
     desktop.click(*panel.find_button(desktop, operator))
-    name = "ESPALIER_OT_" + operator.split(".")[1]
-    wait_until(lambda: name in modal(desktop), 5, f"{operator} is at work", 0.02)
 
 
 def wait_for_end(desktop: Desktop, seconds: float) -> None:
@@ -77,32 +79,30 @@ def changed(before: NDArray[np.uint8], after: NDArray[np.uint8], area: tuple[int
     return float((np.abs(before[part].astype(int) - after[part].astype(int)).max(axis=2) > 12).mean())
 
 
-def viewport(desktop: Desktop) -> tuple[int, int, int, int]:
-    """The area of the 3D viewport on the screen."""
-    return panel.area(desktop, "VIEW_3D")
+def show_cells(desktop: Desktop, shown: bool) -> NDArray[np.uint8]:
+    """Switch the overlay; the screen once it is redrawn."""
+    desktop.python(f"window.scene.espalier.overlay.show = {shown}")
+    time.sleep(1.0)
+    return desktop.screenshot(f"overlay-{'on' if shown else 'off'}")
 
 
 def test_build_and_trace_fills_the_table(desktop: Desktop) -> None:
     before = desktop.python(SNAPSHOT)
     press(desktop, "espalier.build_trace")
+    wait_until(lambda: desktop.python(ROWS), 30, "the session of the run")
     wait_for_end(desktop, 60)
     desktop.screenshot("build-and-trace")
-    results = desktop.python(
-        SESSION + "value = [[result.method, result.build_ms, result.trace_s, result.rays] for result in session.run.results]"
-    )
-    assert [row[0] for row in results] == ["bvh-median", "bvh-sah", "grid", "hybrid-sampled", "hybrid-cost"]
-    assert all(build_ms > 0 and trace_s > 0 and rays >= 160 * 120 for _, build_ms, trace_s, rays in results)
+    rows = desktop.python(ROWS)
+    assert [row[0] for row in rows] == METHODS
+    assert all(build_ms > 0 and trace_s > 0 and rays >= 160 * 120 for _, build_ms, trace_s, rays in rows)
     assert desktop.python(SNAPSHOT) == before
 
 
 def test_overlay_draws_the_cells_and_takes_them_away(desktop: Desktop) -> None:
-    view = viewport(desktop)
-    without = desktop.screenshot("overlay-off")
-    show(desktop, True)
-    shown = desktop.screenshot("overlay-on")
-    assert changed(without, shown, view) > 0.02, "boxes are drawn over the viewport"
-    show(desktop, False)
-    assert changed(without, desktop.screenshot("overlay-off-again"), view) < 0.001
+    view = panel.area(desktop, "VIEW_3D")
+    without = show_cells(desktop, False)
+    assert changed(without, show_cells(desktop, True), view) > 0.02, "boxes are drawn over the viewport"
+    assert changed(without, show_cells(desktop, False), view) < 0.001, "and nothing of them stays"
 
 
 def test_compare_shows_both_pictures(desktop: Desktop) -> None:
@@ -139,19 +139,27 @@ def slowest_answer_while_modal(desktop: Desktop) -> float:
 def test_escape_in_the_middle_stops_and_changes_nothing(desktop: Desktop, operator: str) -> None:
     desktop.python(f"window.scene.espalier.samples = {MANY_SAMPLES}")
     before = desktop.python(SNAPSHOT)
+    idle = desktop.screenshot("idle")
     press(desktop, operator)
+    wait_until(lambda: modal(desktop), 5, f"{operator} is at work", 0.02)
     time.sleep(1.0)
+    at_work = desktop.screenshot(f"at-work-{operator}")
+    assert changed(idle, at_work, panel.area(desktop, "PROPERTIES")) > 0.005, "the panel shows progress"
     assert modal(desktop), "work for many minutes is still going on"
-    pressed = time.monotonic()
-    desktop.key("Escape")
-    wait_until(lambda: not modal(desktop), 5, "the operator's end after Esc", 0.02)
-    elapsed = time.monotonic() - pressed
+    elapsed = seconds_to_end_on_escape(desktop)
     desktop.screenshot(f"escape-{operator}")
     assert elapsed < ESCAPE_SECONDS + HARNESS_SECONDS
     assert desktop.python(SNAPSHOT) == before
     desktop.python("window.scene.espalier.samples = 1")
-    threads = "import threading\nvalue = [thread.name for thread in threading.enumerate()]"
-    assert not [name for name in desktop.python(threads) if "espalier" in name]
+    assert not [name for name in desktop.python(THREADS) if "espalier" in name]
+
+
+def seconds_to_end_on_escape(desktop: Desktop) -> float:
+    """Press Esc over the window; the seconds until no operator of the extension runs."""
+    pressed = time.monotonic()
+    desktop.key("Escape")
+    wait_until(lambda: not modal(desktop), 5, "the operator's end after Esc", 0.02)
+    return time.monotonic() - pressed
 
 
 def test_disabled_it_leaves_the_interface_clean(desktop: Desktop) -> None:
