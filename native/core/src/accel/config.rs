@@ -1,0 +1,114 @@
+//! Every constant that steers a builder, each with its meaning, default and range.
+
+use super::sah::MOST_BINS;
+use crate::{Error, triangle::LANES};
+
+/// Settings of all builders. Each method reads those it needs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Config {
+    /// Most triangles in a leaf; 1 to 8, the lanes of a block.
+    pub leaf_size: usize,
+    /// Bins per axis of the binned surface area heuristic; 2 to 32. Wald, "On fast Construction of SAH-based Bounding
+    /// Volume Hierarchies", RT 2007, finds 16 enough.
+    pub sah_bins: usize,
+    /// Grid cells per triangle; above 0, at most 64. Ize, Shirley and Parker, "Grid Creation Strategies for Efficient
+    /// Ray Tracing", RT 2007.
+    pub grid_density: f64,
+    /// No grid has more cells than this; 1 to 2^30.
+    pub grid_most_cells: usize,
+    /// Seed of the sampled hybrids' rays.
+    pub seed: u64,
+    /// How many rays are to be traced through the finished accelerator; at least 0.
+    pub expected_rays: f64,
+    /// Rays that a node with the scene's whole volume is sampled with; a node's own number is its share of that
+    /// volume, within the next two bounds.
+    pub sample_rays: f64,
+    /// Fewest rays a node is sampled with; at least 4.
+    pub sample_least: u32,
+    /// Most rays a node is sampled with.
+    pub sample_most: u32,
+    /// A node can be uniform where at least this share of its sample rays hit; 0 to 1.
+    pub hit_threshold: f64,
+    /// A node can be uniform where the hits over the strata vary at most this much more than chance alone would make
+    /// them (index of dispersion: chi-squared over its degrees of freedom).
+    pub spread_threshold: f64,
+    /// Nodes with fewer triangles never become grids.
+    pub grid_least_triangles: usize,
+    /// Nodes with more triangles never become grids.
+    pub grid_most_triangles: usize,
+    /// What a traversal costs on this machine.
+    pub cost: CostConstants,
+}
+
+/// Nanoseconds per unit of work of a single ray, as [`calibrate`](super::calibrate) measures them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CostConstants {
+    /// Visiting a wide node.
+    pub node_ns: f64,
+    /// Testing a block of triangles.
+    pub block_ns: f64,
+    /// Stepping into a grid cell.
+    pub cell_ns: f64,
+    /// Gathering and testing up to eight triangles of a grid cell.
+    pub gather_ns: f64,
+    /// Entering one triangle into one grid cell while building.
+    pub reference_ns: f64,
+}
+
+impl Default for CostConstants {
+    /// Measured on one machine; good enough to decide by, since only ratios matter.
+    fn default() -> Self {
+        Self { node_ns: 9.0, block_ns: 9.0, cell_ns: 4.0, gather_ns: 22.0, reference_ns: 30.0 }
+    }
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            leaf_size: LANES,
+            sah_bins: 16,
+            grid_density: 4.0,
+            grid_most_cells: 1 << 27,
+            seed: 0,
+            expected_rays: 1e6,
+            sample_rays: 4096.0,
+            sample_least: 32,
+            sample_most: 1024,
+            hit_threshold: 0.5,
+            spread_threshold: 2.0,
+            grid_least_triangles: 64,
+            grid_most_triangles: 1 << 16,
+            cost: CostConstants::default(),
+        }
+    }
+}
+
+impl Config {
+    /// # Errors
+    /// [`Error::Config`] names the first value out of its range.
+    pub fn check(&self) -> Result<(), Error> {
+        let ranges = [
+            ("leaf_size", self.leaf_size as f64, 1.0, LANES as f64),
+            ("sah_bins", self.sah_bins as f64, 2.0, MOST_BINS as f64),
+            ("grid_density", self.grid_density, 1e-3, 64.0),
+            ("grid_most_cells", self.grid_most_cells as f64, 1.0, (1u64 << 30) as f64),
+            ("expected_rays", self.expected_rays, 0.0, 1e18),
+            ("sample_rays", self.sample_rays, 0.0, 1e9),
+            ("sample_least", f64::from(self.sample_least), 4.0, 1e6),
+            ("sample_most", f64::from(self.sample_most), f64::from(self.sample_least), 1e6),
+            ("hit_threshold", self.hit_threshold, 0.0, 1.0),
+            ("spread_threshold", self.spread_threshold, 0.0, f64::INFINITY),
+            ("grid_least_triangles", self.grid_least_triangles as f64, 1.0, 1e9),
+            ("grid_most_triangles", self.grid_most_triangles as f64, 0.0, 1e9),
+            ("node_ns", self.cost.node_ns, 0.0, 1e6),
+            ("block_ns", self.cost.block_ns, 0.0, 1e6),
+            ("cell_ns", self.cost.cell_ns, 0.0, 1e6),
+            ("gather_ns", self.cost.gather_ns, 0.0, 1e6),
+            ("reference_ns", self.cost.reference_ns, 0.0, 1e6),
+        ];
+        let fault = ranges.into_iter().find(|(_, value, least, most)| !(least..=most).contains(&value));
+        fault.map_or(Ok(()), |(name, value, least, most)| {
+            Err(Error::Config(format!("{name} is {value}; it must be from {least} to {most}")))
+        })
+    }
+}

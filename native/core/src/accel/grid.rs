@@ -1,0 +1,156 @@
+//! Uniform grids: Fujimoto, Tanaka and Iwata, "ARTS: Accelerated Ray-Tracing System", IEEE CG&A 6(4), 1986, in the
+//! compact form of Lagae and Dutré, "Compact, Fast and Robust Grids for Ray Tracing", CGF 27(4), 2008: one pass counts
+//! the references of every cell, one pass writes them.
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::{overlap::Separator, structure::Grid, tree::Item};
+use crate::{Error, Job, Mesh, bounds::Bounds, error, traverse::frame::Domain};
+
+/// A grid with cells of its own.
+#[derive(Debug, Clone)]
+pub struct BuiltGrid {
+    /// Its shape; `first` is 0.
+    pub grid: Grid,
+    /// One entry a cell, and one more for the end.
+    pub starts: Vec<u32>,
+    /// Triangles, cell by cell.
+    pub references: Vec<u32>,
+}
+
+/// Cells along each axis for `count` triangles in a box: in all about `density * count`, as near to cubes as whole
+/// numbers allow (Ize, Shirley and Parker, "Grid Creation Strategies for Efficient Ray Tracing", RT 2007).
+pub fn resolution(bounds: &Bounds, count: usize, density: f64, most_cells: usize) -> [u32; 3] {
+    let extent = bounds.extent().as_dvec3();
+    let longest = extent.max_element().max(f64::MIN_POSITIVE);
+    let wanted = (density * count as f64).clamp(1.0, most_cells as f64);
+    // A flat box is given a thickness below any cell's, so that its volume is not zero.
+    let ratio = (extent / longest).max(glam::DVec3::splat(1e-6 / wanted));
+    let per_unit = (wanted / (ratio.x * ratio.y * ratio.z)).cbrt();
+    let mut cells = ratio.to_array().map(|r| (r * per_unit).floor().clamp(1.0, 4096.0));
+    while cells.iter().product::<f64>() > most_cells as f64 {
+        let longest = (0..3).max_by(|&a, &b| cells[a].total_cmp(&cells[b])).unwrap_or(0);
+        cells[longest] = (cells[longest] / 2.0).floor().max(1.0);
+    }
+    cells.map(|c| c as u32)
+}
+
+/// Items are rasterised in parts of this many, which are also the steps between looks at the job.
+const PART: usize = 1 << 14;
+
+/// Build a grid over `items`, which lie within `bounds`.
+///
+/// A cell lists every triangle that comes within the domain's margin of it, so that rounding in the walk is harmless.
+///
+/// # Errors
+/// [`Error::Cancelled`], [`Error::OutOfMemory`].
+pub fn build(
+    mesh: &Mesh,
+    domain: &Domain,
+    bounds: &Bounds,
+    items: &[Item],
+    resolution: [u32; 3],
+    job: &Job,
+) -> Result<BuiltGrid, Error> {
+    let raster = Raster::new(domain, bounds, resolution);
+    let parts: Vec<Vec<[u32; 2]>> = items
+        .par_chunks(PART)
+        .map(|part| {
+            job.check()?;
+            Ok(part.iter().flat_map(|item| raster.cells_of(mesh, item)).collect())
+        })
+        .collect::<Result<_, Error>>()?;
+    let grid = raster.grid;
+    let (starts, references) = sort_by_cell(&parts, grid.cell_count(), job)?;
+    Ok(BuiltGrid { grid, starts, references })
+}
+
+/// A counting sort of (cell, triangle) pairs that keeps their order within a cell.
+fn sort_by_cell(parts: &[Vec<[u32; 2]>], cell_count: usize, job: &Job) -> Result<(Vec<u32>, Vec<u32>), Error> {
+    let total: usize = parts.iter().map(Vec::len).sum();
+    if total > u32::MAX as usize {
+        return Err(Error::OutOfMemory { what: "the references of a grid's cells", bytes: total * 4 });
+    }
+    let mut starts = error::filled(cell_count + 1, 0u32, "the cells of a grid")?;
+    for part in parts {
+        job.check()?;
+        part.iter().for_each(|&[cell, _]| starts[cell as usize] += 1);
+    }
+    let mut end = 0;
+    for start in &mut starts {
+        end += *start;
+        *start = end;
+    }
+    let mut references = error::filled(total, 0u32, "the references of a grid's cells")?;
+    for part in parts.iter().rev() {
+        job.check()?;
+        for &[cell, primitive] in part.iter().rev() {
+            let start = &mut starts[cell as usize];
+            *start -= 1;
+            references[*start as usize] = primitive;
+        }
+    }
+    Ok((starts, references))
+}
+
+struct Raster {
+    grid: Grid,
+    centre: Vec3,
+    margin: f32,
+}
+
+impl Raster {
+    fn new(domain: &Domain, bounds: &Bounds, resolution: [u32; 3]) -> Self {
+        let (lower, upper) = (bounds.lower - domain.centre, bounds.upper - domain.centre);
+        // A flat axis gets one cell that is as thick as the margin, so that its inverse is finite.
+        let extent = (upper - lower).max(Vec3::splat(domain.margin())).to_array();
+        let cell: [f32; 3] = std::array::from_fn(|k| extent[k] / resolution[k] as f32);
+        let grid = Grid {
+            lower: lower.to_array(),
+            upper: upper.to_array(),
+            cell,
+            inverse_cell: cell.map(|edge| 1.0 / edge),
+            resolution,
+            first: 0,
+        };
+        Self { grid, centre: domain.centre, margin: domain.margin() }
+    }
+
+    /// The cells that a triangle comes within the margin of, paired with it.
+    fn cells_of(&self, mesh: &Mesh, item: &Item) -> impl Iterator<Item = [u32; 2]> {
+        let corners = mesh.corners(item.primitive).map(|corner| corner - self.centre);
+        let [x, y, z] = self.range(&Bounds::of_points(corners));
+        let is_single = x.len() * y.len() * z.len() == 1;
+        let triangle = Separator::new(corners);
+        let primitive = item.primitive;
+        let row = move |y, z| x.clone().map(move |x| [x, y, z]);
+        let cells = z.flat_map(move |z| {
+            let row = row.clone();
+            y.clone().flat_map(move |y| row(y, z))
+        });
+        cells
+            .filter(move |&cell| is_single || self.overlaps(&triangle, cell))
+            .map(move |cell| [self.index(cell), primitive])
+    }
+
+    fn range(&self, bounds: &Bounds) -> [std::ops::Range<u32>; 3] {
+        let bounds = bounds.dilated(self.margin);
+        std::array::from_fn(|k| {
+            let cell = |position: f32| ((position - self.grid.lower[k]) * self.grid.inverse_cell[k]).floor();
+            let last = self.grid.resolution[k] as f32 - 1.0;
+            cell(bounds.lower[k]).clamp(0.0, last) as u32..cell(bounds.upper[k]).clamp(0.0, last) as u32 + 1
+        })
+    }
+
+    fn overlaps(&self, triangle: &Separator, cell: [u32; 3]) -> bool {
+        let edges = Vec3::from_array(self.grid.cell);
+        let position = Vec3::new(cell[0] as f32, cell[1] as f32, cell[2] as f32);
+        let centre = Vec3::from_array(self.grid.lower) + (position + 0.5) * edges;
+        triangle.overlaps(centre, edges * 0.5 + self.margin)
+    }
+
+    fn index(&self, [x, y, z]: [u32; 3]) -> u32 {
+        (z * self.grid.resolution[1] + y) * self.grid.resolution[0] + x
+    }
+}

@@ -1,0 +1,136 @@
+//! From the binary tree to the structure that rays walk: the largest children are opened until eight are side by
+//! side, leaves become blocks, grids are joined into one store. After Wald, Benthin and Boulos, "Getting Rid of
+//! Packets", RT 2008.
+
+use glam::Vec3;
+
+use super::{
+    structure::{Node, NodeRef, Structure},
+    tree::{Kind, Tree},
+};
+use crate::{Error, Job, Mesh, bounds::Bounds, error, traverse::frame::Domain, triangle::Block, triangle::LANES};
+
+/// Pack a tree.
+///
+/// # Errors
+/// [`Error::Cancelled`], [`Error::OutOfMemory`].
+pub fn pack(tree: &Tree, mesh: &Mesh, job: &Job) -> Result<Structure, Error> {
+    let domain = Domain::new(&mesh.bounds());
+    let leaves = tree.nodes.iter().filter(|node| node.kind == Kind::Leaf).count();
+    let blocks = error::reserve(leaves, "the leaves")?;
+    let mut packer = Packer { tree, mesh, job, centre: domain.centre, nodes: Vec::new(), blocks };
+    let packed = if tree.nodes.is_empty() { Packed::EMPTY } else { packer.subtree(0)? };
+    let (nodes, blocks) = (packer.nodes, packer.blocks);
+    let mut structure = Structure {
+        root: packed.root,
+        domain,
+        nodes,
+        blocks,
+        grids: Vec::new(),
+        starts: Vec::new(),
+        references: Vec::new(),
+        stack_size: packed.stack_size,
+    };
+    join_grids(tree, &mut structure)?;
+    Ok(structure)
+}
+
+/// A packed subtree.
+struct Packed {
+    root: NodeRef,
+    /// Most entries a traversal of it can put on its stack.
+    stack_size: usize,
+}
+
+impl Packed {
+    const EMPTY: Self = Self { root: NodeRef::EMPTY, stack_size: 0 };
+}
+
+struct Packer<'a> {
+    tree: &'a Tree,
+    mesh: &'a Mesh,
+    job: &'a Job,
+    centre: Vec3,
+    nodes: Vec<Node>,
+    blocks: Vec<Block>,
+}
+
+impl Packer<'_> {
+    fn subtree(&mut self, index: usize) -> Result<Packed, Error> {
+        let root = match self.tree.nodes[index].kind {
+            Kind::Branch { .. } => return self.branch(index),
+            Kind::Leaf => self.leaf(index),
+            Kind::Grid(grid) => NodeRef::grid(grid as usize),
+        };
+        Ok(Packed { root, stack_size: 0 })
+    }
+
+    fn branch(&mut self, index: usize) -> Result<Packed, Error> {
+        if self.nodes.len().is_multiple_of(1 << 12) {
+            self.job.check()?;
+        }
+        let slot = self.nodes.len();
+        self.nodes.push(Node::EMPTY);
+        let children = self.opened(index);
+        let mut node = Node::EMPTY;
+        let mut deepest = 0;
+        for (lane, &child) in children.iter().enumerate() {
+            set_planes(&mut node, lane, &self.tree.nodes[child].bounds, self.centre);
+            let packed = self.subtree(child)?;
+            node.child[lane] = packed.root;
+            deepest = deepest.max(packed.stack_size);
+        }
+        self.nodes[slot] = node;
+        Ok(Packed { root: NodeRef::branch(slot), stack_size: children.len() - 1 + deepest })
+    }
+
+    /// Up to eight descendants that stand in for a branch: whichever is largest is opened first.
+    fn opened(&self, index: usize) -> Vec<usize> {
+        let mut open = vec![index];
+        while open.len() < LANES {
+            let area = |&(_, &child): &(usize, &usize)| self.tree.nodes[child].bounds.half_area();
+            let branches = open.iter().enumerate().filter(|(_, child)| self.tree.children(**child).is_some());
+            let Some((place, &largest)) = branches.max_by(|a, b| area(a).total_cmp(&area(b))) else {
+                break;
+            };
+            let children = self.tree.children(largest);
+            open.splice(place..=place, children.into_iter().flatten());
+        }
+        open
+    }
+
+    fn leaf(&mut self, index: usize) -> NodeRef {
+        let items = self.tree.items_of(&self.tree.nodes[index]);
+        let mut block = Block::EMPTY;
+        for (lane, item) in items.iter().enumerate() {
+            block.set(lane, item.primitive, self.mesh.corners(item.primitive));
+        }
+        self.blocks.push(block);
+        NodeRef::leaf(self.blocks.len() - 1, items.len())
+    }
+}
+
+fn set_planes(node: &mut Node, lane: usize, bounds: &Bounds, centre: Vec3) {
+    let (lower, upper) = (bounds.lower - centre, bounds.upper - centre);
+    for k in 0..3 {
+        node.plane[k][lane] = lower[k];
+        node.plane[3 + k][lane] = upper[k];
+    }
+}
+
+fn join_grids(tree: &Tree, structure: &mut Structure) -> Result<(), Error> {
+    let cells = tree.grids.iter().map(|built| built.starts.len()).sum();
+    let references: usize = tree.grids.iter().map(|built| built.references.len()).sum();
+    if references > u32::MAX as usize {
+        return Err(Error::OutOfMemory { what: "the references of all grid cells", bytes: references * 4 });
+    }
+    structure.starts = error::reserve(cells, "the cells of all grids")?;
+    structure.references = error::reserve(references, "the references of all grid cells")?;
+    for built in &tree.grids {
+        let (first, offset) = (structure.starts.len(), structure.references.len() as u32);
+        structure.grids.push(super::structure::Grid { first, ..built.grid.clone() });
+        structure.starts.extend(built.starts.iter().map(|start| start + offset));
+        structure.references.extend_from_slice(&built.references);
+    }
+    Ok(())
+}

@@ -1,0 +1,171 @@
+//! The packed tree that rays walk: wide nodes, blocks of triangles, grids. Data only; builders and traversal know it,
+//! it knows neither.
+
+use crate::{
+    traverse::frame::Domain,
+    triangle::{Block, LANES},
+};
+
+/// A tagged index: what a child of a node is, and where.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(transparent)]
+pub struct NodeRef(u32);
+
+/// A [`NodeRef`], taken apart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Target {
+    /// Index into [`Structure::nodes`].
+    Branch(u32),
+    /// Index into [`Structure::blocks`], and how many of its lanes are used.
+    Leaf {
+        /// The block.
+        block: u32,
+        /// Used lanes, 1 to 8; they come first.
+        count: u32,
+    },
+    /// Index into [`Structure::grids`].
+    Grid(u32),
+    /// Nothing.
+    Empty,
+}
+
+impl NodeRef {
+    const TAG: u32 = 30;
+    const COUNT: u32 = 27;
+    /// Indices are below this; [`crate::Mesh`] bounds the number of triangles by it, and every builder makes at most
+    /// one block or node a triangle.
+    const INDEX: u32 = (1 << Self::COUNT) - 1;
+
+    /// Nothing.
+    pub const EMPTY: Self = Self(3 << Self::TAG);
+
+    /// A wide node.
+    pub fn branch(index: usize) -> Self {
+        assert!(index <= Self::INDEX as usize);
+        Self(index as u32)
+    }
+
+    /// A block with `count` triangles.
+    pub fn leaf(block: usize, count: usize) -> Self {
+        assert!(block <= Self::INDEX as usize && (1..=LANES).contains(&count));
+        Self(1 << Self::TAG | (count as u32 - 1) << Self::COUNT | block as u32)
+    }
+
+    /// A grid.
+    pub fn grid(index: usize) -> Self {
+        assert!(index <= Self::INDEX as usize);
+        Self(2 << Self::TAG | index as u32)
+    }
+
+    /// What it refers to.
+    #[inline(always)]
+    pub fn target(self) -> Target {
+        match self.0 >> Self::TAG {
+            0 => Target::Branch(self.0),
+            1 => Target::Leaf { block: self.0 & Self::INDEX, count: (self.0 >> Self::COUNT & 7) + 1 },
+            2 => Target::Grid(self.0 & Self::INDEX),
+            _ => Target::Empty,
+        }
+    }
+}
+
+/// Eight children with their boxes, relative to the centre of the domain.
+#[derive(Debug, Clone)]
+#[repr(C, align(64))]
+pub struct Node {
+    /// `plane[k][lane]` is the lower, `plane[3 + k][lane]` the upper side along axis k; +inf and -inf where empty.
+    pub plane: [[f32; LANES]; 6],
+    /// The children; the used ones come first.
+    pub child: [NodeRef; LANES],
+}
+
+impl Node {
+    /// A node without children.
+    pub const EMPTY: Self = Self {
+        plane: [
+            [f32::INFINITY; LANES],
+            [f32::INFINITY; LANES],
+            [f32::INFINITY; LANES],
+            [f32::NEG_INFINITY; LANES],
+            [f32::NEG_INFINITY; LANES],
+            [f32::NEG_INFINITY; LANES],
+        ],
+        child: [NodeRef::EMPTY; LANES],
+    };
+
+    /// How many children it has.
+    pub fn len(&self) -> usize {
+        self.child.iter().take_while(|&&child| child != NodeRef::EMPTY).count()
+    }
+
+    /// Whether it has no child.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+/// A uniform grid over a box. Cell `(x, y, z)` has index `(z * resolution[1] + y) * resolution[0] + x`; its references
+/// are those from `starts[first + index]` to `starts[first + index + 1]`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Grid {
+    /// Lower corner, relative to the centre of the domain.
+    pub lower: [f32; 3],
+    /// Upper corner, likewise.
+    pub upper: [f32; 3],
+    /// Edge lengths of a cell.
+    pub cell: [f32; 3],
+    /// Their inverses.
+    pub inverse_cell: [f32; 3],
+    /// Cells along each axis.
+    pub resolution: [u32; 3],
+    /// Where its row of [`Structure::starts`] begins.
+    pub first: usize,
+}
+
+impl Grid {
+    /// How many cells it has.
+    pub fn cell_count(&self) -> usize {
+        self.resolution.iter().map(|&r| r as usize).product()
+    }
+}
+
+/// A finished accelerator's data.
+#[derive(Debug, Clone)]
+pub struct Structure {
+    /// Where rays begin.
+    pub root: NodeRef,
+    /// The arithmetic's frame of reference.
+    pub domain: Domain,
+    /// Wide nodes, each before its children.
+    pub nodes: Vec<Node>,
+    /// Leaves.
+    pub blocks: Vec<Block>,
+    /// Grids.
+    pub grids: Vec<Grid>,
+    /// For the cells of all grids, where their references begin in `references`, and after each grid's last cell
+    /// where they end.
+    pub starts: Vec<u32>,
+    /// Triangles of all grid cells.
+    pub references: Vec<u32>,
+    /// No traversal holds more entries on its stack.
+    pub stack_size: usize,
+}
+
+impl Structure {
+    /// The triangles in a cell of a grid.
+    #[inline(always)]
+    pub fn cell(&self, grid: &Grid, index: usize) -> &[u32] {
+        let start = self.starts[grid.first + index] as usize;
+        let end = self.starts[grid.first + index + 1] as usize;
+        &self.references[start..end]
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&*self.nodes)
+            + size_of_val(&*self.blocks)
+            + size_of_val(&*self.grids)
+            + size_of_val(&*self.starts)
+            + size_of_val(&*self.references)
+    }
+}

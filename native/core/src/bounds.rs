@@ -1,0 +1,63 @@
+//! Axis-aligned bounding boxes.
+
+use glam::Vec3;
+
+/// A box from `lower` to `upper`; empty where lower exceeds upper.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bounds {
+    /// Least corner.
+    pub lower: Vec3,
+    /// Greatest corner.
+    pub upper: Vec3,
+}
+
+impl Bounds {
+    /// The box that contains nothing and is neutral under [`Bounds::union`].
+    pub const EMPTY: Self = Self { lower: Vec3::INFINITY, upper: Vec3::NEG_INFINITY };
+
+    /// The smallest box around some points.
+    pub fn of_points(points: impl IntoIterator<Item = Vec3>) -> Self {
+        points.into_iter().fold(Self::EMPTY, |bounds, point| bounds.union(&Self { lower: point, upper: point }))
+    }
+
+    /// The smallest box around both.
+    #[inline]
+    pub fn union(&self, other: &Self) -> Self {
+        Self { lower: self.lower.min(other.lower), upper: self.upper.max(other.upper) }
+    }
+
+    /// Whether no point is inside.
+    pub fn is_empty(&self) -> bool {
+        self.lower.cmpgt(self.upper).any()
+    }
+
+    /// Edge lengths; zero for an empty box.
+    #[inline]
+    pub fn extent(&self) -> Vec3 {
+        (self.upper - self.lower).max(Vec3::ZERO)
+    }
+
+    /// The middle.
+    #[inline]
+    pub fn centre(&self) -> Vec3 {
+        self.lower * 0.5 + self.upper * 0.5
+    }
+
+    /// Half the surface area: what the surface area heuristic compares.
+    #[inline]
+    pub fn half_area(&self) -> f32 {
+        let e = self.extent();
+        e.x * e.y + e.y * e.z + e.z * e.x
+    }
+
+    /// Product of the edge lengths.
+    pub fn volume(&self) -> f64 {
+        let e = self.extent().as_dvec3();
+        e.x * e.y * e.z
+    }
+
+    /// The box grown by `margin` on every side.
+    pub fn dilated(&self, margin: f32) -> Self {
+        Self { lower: self.lower - Vec3::splat(margin), upper: self.upper + Vec3::splat(margin) }
+    }
+}

@@ -1,0 +1,100 @@
+//! Eight lanes of single precision, one implementation per instruction set.
+//!
+//! A value of a type that implements [`Simd`] proves that the processor has the instruction set: only [`Level::detect`]
+//! makes one. Kernels are written once, generic over the token, and enter through [`Level::run`].
+//!
+//! This folder is the only home of `unsafe`.
+#![allow(unsafe_code)]
+
+mod portable;
+#[cfg(target_arch = "x86_64")]
+mod x86;
+
+pub use portable::Portable;
+#[cfg(target_arch = "x86_64")]
+pub use x86::Avx2;
+
+/// Operations on eight lanes.
+///
+/// `min` and `max` return their second argument where either is not a number, as x86 does; kernels rely on that.
+pub trait Simd: Copy + Send + Sync + 'static {
+    /// Eight numbers.
+    type F32: Copy;
+
+    /// Compile `kernel` for this instruction set and run it.
+    fn run<K: Kernel>(self, kernel: K) -> K::Output;
+    /// Eight copies.
+    fn splat(self, value: f32) -> Self::F32;
+    /// Eight numbers from memory.
+    fn load(self, values: &[f32; 8]) -> Self::F32;
+    /// Eight numbers to memory.
+    fn store(self, value: Self::F32) -> [f32; 8];
+    /// a - b
+    fn sub(self, a: Self::F32, b: Self::F32) -> Self::F32;
+    /// a * b
+    fn mul(self, a: Self::F32, b: Self::F32) -> Self::F32;
+    /// a * b + c, rounded once or twice
+    fn mul_add(self, a: Self::F32, b: Self::F32, c: Self::F32) -> Self::F32;
+    /// The lesser of each pair.
+    fn min(self, a: Self::F32, b: Self::F32) -> Self::F32;
+    /// The greater of each pair.
+    fn max(self, a: Self::F32, b: Self::F32) -> Self::F32;
+    /// Bit `i` is set where lane `i` has a <= b.
+    fn le(self, a: Self::F32, b: Self::F32) -> u32;
+    /// Bit `i` is set where lane `i` has a < 0 < b.
+    fn straddles_zero(self, a: Self::F32, b: Self::F32) -> u32;
+}
+
+/// Work written once for every instruction set. Implementations must be `#[inline(always)]`, and so must all that they
+/// call in their inner loops.
+pub trait Kernel {
+    /// What it returns.
+    type Output;
+    /// Do the work.
+    fn run<S: Simd>(self, simd: S) -> Self::Output;
+}
+
+/// An instruction set that this processor has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Level {
+    /// Plain arrays: any processor.
+    Portable(Portable),
+    /// 256-bit vectors with fused multiply-add.
+    #[cfg(target_arch = "x86_64")]
+    Avx2(Avx2),
+}
+
+impl Level {
+    /// The best instruction set of this processor.
+    pub fn detect() -> Self {
+        Self::available().pop().unwrap_or(Self::Portable(Portable))
+    }
+
+    /// Every instruction set of this processor, the best last.
+    pub fn available() -> Vec<Self> {
+        #[allow(unused_mut)]
+        let mut levels = vec![Self::Portable(Portable)];
+        #[cfg(target_arch = "x86_64")]
+        levels.extend(Avx2::detect().map(Self::Avx2));
+        levels
+    }
+
+    /// Its name: `portable` or `avx2`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Portable(_) => "portable",
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2(_) => "avx2",
+        }
+    }
+
+    /// Run a kernel compiled for this instruction set.
+    #[inline]
+    pub fn run<K: Kernel>(self, kernel: K) -> K::Output {
+        match self {
+            Self::Portable(simd) => simd.run(kernel),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2(simd) => simd.run(kernel),
+        }
+    }
+}

@@ -1,0 +1,66 @@
+//! Plain arrays, which compilers turn into whatever vectors the target is known to have.
+
+use super::{Kernel, Simd};
+
+/// Needs nothing, so anybody may make one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Portable;
+
+#[inline(always)]
+fn zip(a: [f32; 8], b: [f32; 8], f: impl Fn(f32, f32) -> f32) -> [f32; 8] {
+    std::array::from_fn(|i| f(a[i], b[i]))
+}
+
+#[inline(always)]
+fn bits(f: impl Fn(usize) -> bool) -> u32 {
+    (0..8).fold(0, |mask, i| mask | u32::from(f(i)) << i)
+}
+
+impl Simd for Portable {
+    type F32 = [f32; 8];
+
+    #[inline]
+    fn run<K: Kernel>(self, kernel: K) -> K::Output {
+        kernel.run(self)
+    }
+    #[inline(always)]
+    fn splat(self, value: f32) -> [f32; 8] {
+        [value; 8]
+    }
+    #[inline(always)]
+    fn load(self, values: &[f32; 8]) -> [f32; 8] {
+        *values
+    }
+    #[inline(always)]
+    fn store(self, value: [f32; 8]) -> [f32; 8] {
+        value
+    }
+    #[inline(always)]
+    fn sub(self, a: [f32; 8], b: [f32; 8]) -> [f32; 8] {
+        zip(a, b, |a, b| a - b)
+    }
+    #[inline(always)]
+    fn mul(self, a: [f32; 8], b: [f32; 8]) -> [f32; 8] {
+        zip(a, b, |a, b| a * b)
+    }
+    #[inline(always)]
+    fn mul_add(self, a: [f32; 8], b: [f32; 8], c: [f32; 8]) -> [f32; 8] {
+        std::array::from_fn(|i| a[i] * b[i] + c[i])
+    }
+    #[inline(always)]
+    fn min(self, a: [f32; 8], b: [f32; 8]) -> [f32; 8] {
+        zip(a, b, |a, b| if a < b { a } else { b })
+    }
+    #[inline(always)]
+    fn max(self, a: [f32; 8], b: [f32; 8]) -> [f32; 8] {
+        zip(a, b, |a, b| if a > b { a } else { b })
+    }
+    #[inline(always)]
+    fn le(self, a: [f32; 8], b: [f32; 8]) -> u32 {
+        bits(|i| a[i] <= b[i])
+    }
+    #[inline(always)]
+    fn straddles_zero(self, a: [f32; 8], b: [f32; 8]) -> u32 {
+        bits(|i| (a[i] < 0.0) & (b[i] > 0.0))
+    }
+}

@@ -1,0 +1,117 @@
+//! Walking a uniform grid with a 3D digital differential analyser, after Amanatides and Woo, "A Fast Voxel Traversal
+//! Algorithm for Ray Tracing", Eurographics 1987.
+//!
+//! A triangle may stretch over many cells, so a hit counts only once the walk has reached the cell it lies in; it is
+//! kept as the best so far until then, and the walk ends when the current cell ends behind it. Every crossing is
+//! computed from its plane, never accumulated, so each is off by at most 8uR (see [`super::frame`]), and cells list
+//! every triangle within [`Domain::margin`](super::frame::Domain::margin) of them: what is found does not depend on
+//! which of two cells a rounded crossing chooses.
+
+use super::{frame::Frame, leaf::Search, probe::Probe};
+use crate::{
+    Mesh,
+    accel::structure::{Grid, Structure},
+    simd::Simd,
+};
+
+struct Walk {
+    index: isize,
+    cell: [i32; 3],
+    step: [i32; 3],
+    stride: [isize; 3],
+    crossing: [f32; 3],
+}
+
+/// Search a grid; true once there is any hit, where `any` is wanted.
+#[inline(always)]
+pub fn walk<S: Simd, P: Probe, const ANY: bool>(
+    search: &mut Search<'_, S, P>,
+    structure: &Structure,
+    mesh: &Mesh,
+    grid: &Grid,
+) -> bool {
+    let Some(enter) = enter(search.frame, grid, search.best.t) else {
+        return false;
+    };
+    let frame = search.frame;
+    let mut walk = Walk::new(frame, grid, enter);
+    loop {
+        search.probe.step();
+        let triangles = structure.cell(grid, walk.index as usize);
+        if !triangles.is_empty() && search.gather(mesh, triangles) && ANY {
+            return true;
+        }
+        let axis = walk.next_axis();
+        if search.best.t < walk.crossing[axis] || !walk.advance(axis, frame, grid) {
+            return false;
+        }
+    }
+}
+
+/// Where the ray enters the dilated box of a grid, if it does before `limit`.
+#[inline(always)]
+fn enter(frame: &Frame, grid: &Grid, limit: f32) -> Option<f32> {
+    let (mut near, mut far) = (frame.tmin, limit);
+    for k in 0..3 {
+        let (first, last) =
+            if frame.inverse[k] < 0.0 { (grid.upper[k], grid.lower[k]) } else { (grid.lower[k], grid.upper[k]) };
+        near = near.max(first * frame.inverse[k] + frame.near_bias[k]);
+        far = far.min(last * frame.inverse[k] + frame.far_bias[k]);
+    }
+    (near <= far).then_some(near)
+}
+
+impl Walk {
+    #[inline(always)]
+    fn new(frame: &Frame, grid: &Grid, enter: f32) -> Self {
+        let resolution = grid.resolution.map(|r| r as i32);
+        let cell: [i32; 3] = std::array::from_fn(|k| {
+            let position = frame.local[k] + frame.direction[k] * enter;
+            (((position - grid.lower[k]) * grid.inverse_cell[k]).floor() as i32).clamp(0, resolution[k] - 1)
+        });
+        let step = frame.inverse.map(|inverse| if inverse < 0.0 { -1 } else { 1 });
+        let rows = [1, resolution[0] as isize, resolution[0] as isize * resolution[1] as isize];
+        let mut walk = Self {
+            index: (0..3).map(|k| cell[k] as isize * rows[k]).sum(),
+            cell,
+            step,
+            stride: std::array::from_fn(|k| rows[k] * step[k] as isize),
+            crossing: [0.0; 3],
+        };
+        walk.crossing = std::array::from_fn(|k| walk.crossing(k, frame, grid));
+        walk
+    }
+
+    /// The parameter at which the ray leaves the current cell along `axis`.
+    #[inline(always)]
+    fn crossing(&self, axis: usize, frame: &Frame, grid: &Grid) -> f32 {
+        let plane = self.cell[axis] + i32::from(self.step[axis] > 0);
+        let position = grid.lower[axis] + plane as f32 * grid.cell[axis];
+        (position - frame.local[axis]) * frame.inverse[axis]
+    }
+
+    /// The axis along which the ray leaves the current cell first.
+    #[inline(always)]
+    fn next_axis(&self) -> usize {
+        let [x, y, z] = self.crossing;
+        if x <= y && x <= z {
+            0
+        } else if y <= z {
+            1
+        } else {
+            2
+        }
+    }
+
+    /// Step into the next cell; false where the grid ends.
+    #[inline(always)]
+    fn advance(&mut self, axis: usize, frame: &Frame, grid: &Grid) -> bool {
+        self.cell[axis] += self.step[axis];
+        self.index += self.stride[axis];
+        let inside = (self.cell[axis] as u32) < grid.resolution[axis];
+        if inside {
+            self.crossing[axis] = self.crossing(axis, frame, grid);
+        }
+        inside
+    }
+}

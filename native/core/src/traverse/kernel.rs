@@ -1,0 +1,137 @@
+//! The loop: one ray against the whole structure, written once for every instruction set, probe, kind of query and
+//! kind of node.
+
+use super::{dda, frame::Frame, leaf::Search, probe::Probe};
+use crate::{
+    Mesh,
+    accel::structure::{Node, NodeRef, Structure, Target},
+    ray::Hit,
+    simd::Simd,
+    triangle::LANES,
+};
+
+/// A subtree to visit, and where the ray enters it.
+#[derive(Debug, Clone, Copy)]
+pub struct Entry {
+    near: f32,
+    node: NodeRef,
+}
+
+impl Entry {
+    /// Fills a stack.
+    pub const NONE: Self = Self { near: f32::INFINITY, node: NodeRef::EMPTY };
+}
+
+/// A frame's constants in vectors, ready for node tests.
+struct Planes<S: Simd> {
+    near: [usize; 3],
+    inverse: [S::F32; 3],
+    near_bias: [S::F32; 3],
+    far_bias: [S::F32; 3],
+    tmin: S::F32,
+}
+
+impl<S: Simd> Planes<S> {
+    #[inline(always)]
+    fn new(simd: S, frame: &Frame) -> Self {
+        Self {
+            near: std::array::from_fn(|k| if frame.inverse[k] < 0.0 { k + 3 } else { k }),
+            inverse: frame.inverse.map(|value| simd.splat(value)),
+            near_bias: frame.near_bias.map(|value| simd.splat(value)),
+            far_bias: frame.far_bias.map(|value| simd.splat(value)),
+            tmin: simd.splat(frame.tmin),
+        }
+    }
+
+    /// The children that the ray meets before `limit`, and where.
+    #[inline(always)]
+    fn meet(&self, simd: S, node: &Node, limit: f32) -> (u32, [f32; LANES]) {
+        let (mut near, mut far) = (self.tmin, simd.splat(limit));
+        for k in 0..3 {
+            let first = simd.load(&node.plane[self.near[k]]);
+            let last = simd.load(&node.plane[(self.near[k] + 3) % 6]);
+            near = simd.max(simd.mul_add(first, self.inverse[k], self.near_bias[k]), near);
+            far = simd.min(simd.mul_add(last, self.inverse[k], self.far_bias[k]), far);
+        }
+        (simd.le(near, far), simd.store(near))
+    }
+}
+
+/// The first hit along the ray in the order of [`Hit::precedes`], or, where `ANY`, some hit; in the frame's units, and
+/// with primitive MISS where there is none. `GRIDS` tells that the structure has grids.
+#[inline(always)]
+pub fn trace<S: Simd, P: Probe, const GRIDS: bool, const ANY: bool>(
+    simd: S,
+    structure: &Structure,
+    mesh: &Mesh,
+    frame: &Frame,
+    stack: &mut [Entry],
+    probe: &mut P,
+) -> Hit {
+    let mut search = Search::new(simd, frame, probe);
+    let planes = Planes::new(simd, frame);
+    let mut depth = 0;
+    let mut current = structure.root;
+    loop {
+        let found = match current.target() {
+            Target::Branch(index) => {
+                search.probe.step();
+                let node = &structure.nodes[index as usize];
+                let (met, near) = planes.meet(simd, node, search.best.t);
+                if met != 0 {
+                    current = descend(node, met, &near, stack, &mut depth);
+                    continue;
+                }
+                false
+            }
+            Target::Leaf { block, count } => search.block(&structure.blocks[block as usize], count),
+            Target::Grid(index) if GRIDS => {
+                dda::walk::<S, P, ANY>(&mut search, structure, mesh, &structure.grids[index as usize])
+            }
+            Target::Grid(_) | Target::Empty => false,
+        };
+        if ANY && found {
+            return search.best;
+        }
+        match pop(stack, &mut depth, search.best.t) {
+            Some(node) => current = node,
+            None => return search.best,
+        }
+    }
+}
+
+/// The nearest of the children met; the others go to the stack.
+#[inline(always)]
+fn descend(node: &Node, met: u32, near: &[f32; LANES], stack: &mut [Entry], depth: &mut usize) -> NodeRef {
+    let entry = |lane: usize| Entry { near: near[lane & 7], node: node.child[lane & 7] };
+    let mut rest = met & (met - 1);
+    let mut nearest = entry(met.trailing_zeros() as usize);
+    while rest != 0 {
+        let mut other = entry(rest.trailing_zeros() as usize);
+        rest &= rest - 1;
+        if other.near < nearest.near {
+            std::mem::swap(&mut other, &mut nearest);
+        }
+        push(stack, depth, other);
+    }
+    nearest.node
+}
+
+#[inline(always)]
+fn push(stack: &mut [Entry], depth: &mut usize, entry: Entry) {
+    stack[*depth] = entry;
+    *depth += 1;
+}
+
+/// The last entry that the ray still reaches before `limit`.
+#[inline(always)]
+fn pop(stack: &[Entry], depth: &mut usize, limit: f32) -> Option<NodeRef> {
+    while *depth > 0 {
+        *depth -= 1;
+        let entry = stack[*depth];
+        if entry.near <= limit {
+            return Some(entry.node);
+        }
+    }
+    None
+}
