@@ -58,3 +58,12 @@ class BusyError(EspalierAddonError):
 
     def __init__(self, scene: str) -> None:
         super().__init__(f"Scene '{scene}' is still being traced: wait for it, or press Esc to cancel it")
+
+
+class CaptureError(EspalierAddonError):
+    """Blender could not evaluate the scene as a render would."""
+
+    def __init__(self, reason: str) -> None:
+        super().__init__(
+            f"The scene cannot be evaluated for a render ({reason}): wait until no render or bake is under way"
+        )

@@ -161,6 +161,13 @@ class ESPALIER_PG_settings(bpy.types.PropertyGroup):
         soft_max=32,
         max=1024,
     )
+    cost_pass: BoolProperty(
+        name="Cost Pass",
+        description="Render the pass Cost: traversal steps of each pixel's primary rays, counted in a second run "
+        "that no time in the results includes",
+        default=True,
+        options=STATIC,
+    )
     overlay: PointerProperty(type=ESPALIER_PG_overlay, name="Overlay", description="What is drawn over the 3D viewport")
 
 

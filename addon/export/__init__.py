@@ -1,0 +1,66 @@
+"""The scene as numpy arrays: the only reader of meshes, materials, lights and cameras.
+
+It reads what a *render* depsgraph shows, which Blender evaluates with render visibility and render settings of
+modifiers; `capture` gets one outside of a render. Nothing in the file is changed.
+"""
+
+import time
+
+import bpy
+import numpy as np
+
+from ..errors import NonFiniteGeometryError
+from ..scene_data import GeometryData, SceneData
+from .camera import read_camera
+from .flatten import Placement, flatten
+from .images import Images
+from .lights import read_world
+from .materials import Materials
+from .notes import Notes
+from .objects import Objects, note_collections
+
+
+def export_scene(depsgraph: bpy.types.Depsgraph) -> SceneData:
+    """One frame of one view layer of an evaluated render depsgraph.
+
+    Raises NoCameraError, UnsupportedCameraError, NoGeometryError, NonFiniteGeometryError, and ValueError for a
+    viewport's depsgraph, whose geometry may differ from the render's: use `capture.export_frame` there.
+    """
+    if depsgraph.mode != "RENDER":
+        raise ValueError("export_scene needs a render depsgraph; call capture.export_frame outside of a render")
+    start = time.perf_counter()
+    scene, notes = depsgraph.scene, Notes()
+    images = Images(notes)
+    materials = Materials(images, notes)
+    camera = read_camera(scene, notes)
+    note_collections(depsgraph.view_layer, notes)
+    objects = Objects(depsgraph, materials, notes)
+    placements = objects.placements
+    geometry = flatten(placements)
+    _require_finite(geometry, placements)
+    return SceneData(
+        name=scene.name,
+        view_layer=depsgraph.view_layer.name,
+        frame=scene.frame_current,
+        geometry=geometry,
+        camera=camera,
+        materials=tuple(materials.materials),
+        lights=tuple(objects.lights),
+        world=read_world(scene.world, images, notes),
+        textures=tuple(images.textures),
+        warnings=notes.lines(),
+        export_ms=(time.perf_counter() - start) * 1e3,
+    )
+
+
+def _require_finite(geometry: GeometryData, placements: list[Placement]) -> None:
+    """Raise NonFiniteGeometryError with the names of meshes whose vertices are not all finite in world space."""
+    if np.isfinite(geometry.vertices).all():
+        return
+    names, start = [], 0
+    for placement in placements:
+        stop = start + len(placement.matrices) * len(placement.mesh.positions)
+        if not np.isfinite(geometry.vertices[start:stop]).all():
+            names.append(placement.mesh.name)
+        start = stop
+    raise NonFiniteGeometryError(names)

@@ -1,0 +1,92 @@
+"""Walks what renders in a view layer, and gathers meshes with their instances, and lights."""
+
+import bpy
+
+from ..errors import NoGeometryError
+from ..scene_data import LightData
+from .flatten import Placement
+from .lights import read_light
+from .materials import Materials
+from .meshes import read_mesh
+from .notes import Notes
+
+UNSUPPORTED = {
+    "CURVES": "hair curves",
+    "POINTCLOUD": "a point cloud",
+    "VOLUME": "a volume",
+    "GPENCIL": "a Grease Pencil drawing",
+    "GREASEPENCIL": "a Grease Pencil drawing",
+}
+
+
+class Objects:
+    """Meshes, each read once with all its instances, and lights of a render depsgraph."""
+
+    def __init__(self, depsgraph: bpy.types.Depsgraph, materials: Materials, notes: Notes) -> None:
+        """Raises NoGeometryError where nothing that renders has a face."""
+        self.lights: list[LightData] = []
+        self._materials = materials
+        self._notes = notes
+        self._placements: dict[int, Placement | None] = {}
+        self._slots: dict[tuple[int, int], tuple[int, ...]] = {}
+        for instance in depsgraph.object_instances:
+            if instance.show_self:
+                self._visit(instance)
+        if not self.placements:
+            raise NoGeometryError(depsgraph.scene.name, depsgraph.view_layer.name)
+
+    @property
+    def placements(self) -> list[Placement]:
+        """One for each mesh that has faces, in the order of the depsgraph."""
+        return [placement for placement in self._placements.values() if placement is not None]
+
+    def _visit(self, instance: bpy.types.DepsgraphObjectInstance) -> None:
+        """Curves, text, surfaces and metaballs come twice, as themselves and as a mesh: only the mesh is taken."""
+        thing = instance.object
+        if thing.type == "MESH":
+            self._mesh(thing, instance)
+        elif thing.type == "LIGHT":
+            self.lights.append(read_light(thing.data, instance.matrix_world, thing.name, self._notes))
+        elif thing.type in UNSUPPORTED:
+            self._notes.add(f"Object '{thing.name}' is {UNSUPPORTED[thing.type]} and is left out")
+
+    def _mesh(self, thing: bpy.types.Object, instance: bpy.types.DepsgraphObjectInstance) -> None:
+        mesh = thing.data
+        key = mesh.as_pointer()
+        if key not in self._placements:
+            local = read_mesh(mesh)
+            self._placements[key] = None if local is None else Placement(local)
+        placement = self._placements[key]
+        if placement is not None:
+            placement.add(instance.matrix_world.copy(), self._slots_of(thing, key))
+
+    def _slots_of(self, thing: bpy.types.Object, mesh: int) -> tuple[int, ...]:
+        """Material of every slot; kept by original object and mesh, as instances have passing objects."""
+        key = (thing.original.as_pointer(), mesh)
+        if key not in self._slots:
+            self._note_ignored(thing)
+            self._slots[key] = tuple(self._materials.index(slot.material) for slot in thing.material_slots) or (0,)
+        return self._slots[key]
+
+    def _note_ignored(self, thing: bpy.types.Object) -> None:
+        """Note what an object asks for and a trace does not do."""
+        if thing.is_holdout or thing.is_shadow_catcher:
+            self._notes.add(f"Object '{thing.name}': holdout and shadow catcher are ignored; it is traced as it is")
+        visibility = (thing.visible_camera, thing.visible_diffuse, thing.visible_glossy, thing.visible_shadow)
+        if not all(visibility):
+            self._notes.add(f"Object '{thing.name}': ray visibility is ignored; every ray sees it")
+        if any(
+            system.settings.type == "HAIR" and system.settings.render_type == "PATH"
+            for system in thing.particle_systems
+        ):
+            self._notes.add(f"Object '{thing.name}': hair particles are left out")
+
+
+def note_collections(view_layer: bpy.types.ViewLayer, notes: Notes) -> None:
+    """Note collections of a view layer that are holdouts or indirect only, which a trace shows as they are."""
+    waiting = [view_layer.layer_collection]
+    while waiting:
+        layer = waiting.pop()
+        waiting.extend(layer.children)
+        if not layer.exclude and (layer.holdout or layer.indirect_only):
+            notes.add(f"Collection '{layer.name}': holdout and indirect only are ignored; it is traced as it is")
