@@ -93,7 +93,7 @@ fn bounds_of(vertices: &[Vec3], triangles: &[[u32; 3]], part: &[u32]) -> Bounds 
 }
 
 fn check_vertices(vertices: &[Vec3]) -> Result<(), Error> {
-    let fault = vertices.iter().position(|v| !(v.abs().max_element() <= MAX_COORDINATE) || v.is_nan());
+    let fault = vertices.iter().position(|v| !v.is_finite() || v.abs().max_element() > MAX_COORDINATE);
     fault.map_or(Ok(()), |index| {
         let [x, y, z] = vertices[index].to_array();
         Err(Error::Mesh(format!(
