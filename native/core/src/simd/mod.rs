@@ -46,7 +46,8 @@ pub trait Simd: Copy + Send + Sync + 'static {
 }
 
 /// Work written once for every instruction set. Implementations must be `#[inline(always)]`, and so must all that they
-/// call in their inner loops.
+/// call in their inner loops: a closure, or a function that takes one, is compiled without the instruction set and
+/// keeps the operations of [`Simd`] from being inlined (measured: three times slower).
 pub trait Kernel {
     /// What it returns.
     type Output;

@@ -31,14 +31,19 @@ struct Planes<S: Simd> {
     tmin: S::F32,
 }
 
+#[inline(always)]
+fn splat<S: Simd>(simd: S, [x, y, z]: [f32; 3]) -> [S::F32; 3] {
+    [simd.splat(x), simd.splat(y), simd.splat(z)]
+}
+
 impl<S: Simd> Planes<S> {
     #[inline(always)]
     fn new(simd: S, frame: &Frame) -> Self {
         Self {
             near: std::array::from_fn(|k| if frame.inverse[k] < 0.0 { k + 3 } else { k }),
-            inverse: frame.inverse.map(|value| simd.splat(value)),
-            near_bias: frame.near_bias.map(|value| simd.splat(value)),
-            far_bias: frame.far_bias.map(|value| simd.splat(value)),
+            inverse: splat(simd, frame.inverse),
+            near_bias: splat(simd, frame.near_bias),
+            far_bias: splat(simd, frame.far_bias),
             tmin: simd.splat(frame.tmin),
         }
     }

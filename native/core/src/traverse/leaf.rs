@@ -45,9 +45,10 @@ impl<'a, S: Simd, P: Probe> Search<'a, S, P> {
     #[inline(always)]
     fn surely_missed(&self, block: &Block) -> u32 {
         let simd = self.simd;
-        let [a, b, c] = [0, 1, 2].map(|corner| self.shear(&block.corner[corner]));
-        let edge = |p: [S::F32; 2], q: [S::F32; 2]| simd.sub(simd.mul(p[0], q[1]), simd.mul(p[1], q[0]));
-        let (u, v, w) = (edge(c, b), edge(a, c), edge(b, a));
+        let a = self.shear(&block.corner[0]);
+        let b = self.shear(&block.corner[1]);
+        let c = self.shear(&block.corner[2]);
+        let (u, v, w) = (edge(simd, c, b), edge(simd, a, c), edge(simd, b, a));
         let least = simd.min(simd.min(u, v), w);
         let greatest = simd.max(simd.max(u, v), w);
         simd.straddles_zero(least, greatest)
@@ -57,10 +58,18 @@ impl<'a, S: Simd, P: Probe> Search<'a, S, P> {
     #[inline(always)]
     fn shear(&self, corner: &[[f32; LANES]; 3]) -> [S::F32; 2] {
         let (simd, frame) = (self.simd, self.frame);
-        let relative = |k: usize| simd.sub(simd.load(&corner[k]), simd.splat(frame.origin[k]));
         let [kx, ky, kz] = frame.axes;
-        let z = relative(kz);
-        [(kx, 0), (ky, 1)].map(|(k, s)| simd.sub(relative(k), simd.mul(simd.splat(frame.shear[s]), z)))
+        let x = self.relative(corner, kx);
+        let y = self.relative(corner, ky);
+        let z = self.relative(corner, kz);
+        let x = simd.sub(x, simd.mul(simd.splat(frame.shear[0]), z));
+        let y = simd.sub(y, simd.mul(simd.splat(frame.shear[1]), z));
+        [x, y]
+    }
+
+    #[inline(always)]
+    fn relative(&self, corner: &[[f32; LANES]; 3], axis: usize) -> S::F32 {
+        self.simd.sub(self.simd.load(&corner[axis]), self.simd.splat(self.frame.origin[axis]))
     }
 
     /// Test triangles by index, eight at a time; true once there is any hit among them.
@@ -76,4 +85,10 @@ impl<'a, S: Simd, P: Probe> Search<'a, S, P> {
         }
         any
     }
+}
+
+/// Twice the signed areas of the triangles of the origin, `p` and `q`.
+#[inline(always)]
+fn edge<S: Simd>(simd: S, p: [S::F32; 2], q: [S::F32; 2]) -> S::F32 {
+    simd.sub(simd.mul(p[0], q[1]), simd.mul(p[1], q[0]))
 }
