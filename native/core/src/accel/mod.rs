@@ -1,10 +1,14 @@
 //! Accelerators: one structure of branches, leaves and grids, and the methods that decide which is where.
 
+pub mod cells;
+pub mod census;
 pub mod config;
+pub mod decision;
 pub mod grid;
 pub mod median;
 pub mod overlap;
 pub mod pack;
+pub mod places;
 pub mod sah;
 pub mod structure;
 pub mod tree;
@@ -12,7 +16,10 @@ pub mod tree;
 use std::{sync::Arc, time::Instant};
 
 use self::{
+    cells::{CellFilter, Cells},
+    census::Census,
     config::Config,
+    decision::Decision,
     grid::BuiltGrid,
     structure::Structure,
     tree::{Kind, Tree, TreeNode},
@@ -84,6 +91,7 @@ pub struct Accelerator {
     method: Method,
     structure: Structure,
     phases: Vec<PhaseTime>,
+    decisions: Vec<Decision>,
     level: Level,
 }
 
@@ -95,10 +103,10 @@ impl Accelerator {
     pub fn build(mesh: Arc<Mesh>, method: Method, config: &Config, threads: usize, job: &Job) -> Result<Self, Error> {
         config.check()?;
         job.begin(Phase::Build, 2 * mesh.solid().len() as u64);
-        let mut builder = Builder { mesh: &mesh, config, job, phases: Vec::new() };
+        let mut builder = Builder { mesh: &mesh, config, job, phases: Vec::new(), decisions: Vec::new() };
         let structure = pool::install(threads, || builder.structure(method))??;
-        let phases = builder.phases;
-        Ok(Self { mesh, method, structure, phases, level: Level::detect() })
+        let Builder { phases, decisions, .. } = builder;
+        Ok(Self { mesh, method, structure, phases, decisions, level: Level::detect() })
     }
 
     /// The same accelerator, walked with another instruction set.
@@ -124,6 +132,24 @@ impl Accelerator {
     /// How long each phase of the build took.
     pub fn phases(&self) -> &[PhaseTime] {
         &self.phases
+    }
+
+    /// What a hybrid decided on, from the root down; empty for other methods.
+    pub fn decisions(&self) -> &[Decision] {
+        &self.decisions
+    }
+
+    /// What the structure consists of.
+    pub fn census(&self) -> Census {
+        Census::of(&self.structure, &self.mesh.bounds())
+    }
+
+    /// The boxes of the structure, for drawing.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`].
+    pub fn cells(&self, filter: &CellFilter) -> Result<Cells, Error> {
+        Cells::of(&self.structure, &self.mesh.bounds(), filter)
     }
 
     /// For queries on the calling thread; the ones below are for whole batches.
@@ -161,6 +187,7 @@ struct Builder<'a> {
     config: &'a Config,
     job: &'a Job,
     phases: Vec<PhaseTime>,
+    decisions: Vec<Decision>,
 }
 
 impl Builder<'_> {

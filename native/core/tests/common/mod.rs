@@ -2,7 +2,7 @@
 #![allow(dead_code)] // Each test file uses its own part.
 
 use espalier_core::{
-    Accelerator, Column, Hits, Job, Mesh, Rays,
+    Accelerator, Column, Config, Hits, Job, Mesh, Method, Rays,
     ray::{Hit, MISS, Ray},
     traverse::frame::{Domain, Frame},
     triangle,
@@ -64,4 +64,79 @@ pub fn occluded(accelerator: &Accelerator, rays: &RayBatch) -> Vec<bool> {
     let mut blocked = vec![false; rays.len()];
     accelerator.occluded(&rays.rays(), &mut blocked, 1, &Job::new()).unwrap();
     blocked
+}
+
+/// A closed sphere of `20 * 4^subdivisions` triangles around the origin, of radius 1.
+pub fn icosphere(subdivisions: u32) -> (Vec<Vec3>, Vec<[u32; 3]>) {
+    let golden = (1.0 + 5f32.sqrt()) / 2.0;
+    let rectangle = |a: f32, b: f32| [[a, b], [-a, b], [-a, -b], [a, -b]];
+    let corners = rectangle(1.0, golden).into_iter();
+    let mut vertices: Vec<Vec3> = corners
+        .flat_map(|[a, b]| [Vec3::new(0.0, a, b), Vec3::new(a, b, 0.0), Vec3::new(b, 0.0, a)])
+        .map(Vec3::normalize)
+        .collect();
+    let mut triangles = hull_faces(&vertices);
+    for _ in 0..subdivisions {
+        triangles = subdivided(&mut vertices, &triangles);
+    }
+    (vertices, triangles)
+}
+
+/// The faces of a convex solid of equilateral triangles: all triples of points one shortest distance apart, turned
+/// outwards.
+fn hull_faces(vertices: &[Vec3]) -> Vec<[u32; 3]> {
+    let count = vertices.len();
+    let edge = (1..count).map(|i| vertices[0].distance(vertices[i])).fold(f32::INFINITY, f32::min) * 1.01;
+    let near = |a: usize, b: usize| vertices[a].distance(vertices[b]) < edge;
+    let mut faces = Vec::new();
+    for a in 0..count {
+        for b in a + 1..count {
+            for c in (b + 1..count).filter(|&c| near(a, b) && near(b, c) && near(c, a)) {
+                let normal = (vertices[b] - vertices[a]).cross(vertices[c] - vertices[a]);
+                let face = if normal.dot(vertices[a]) > 0.0 { [a, b, c] } else { [a, c, b] };
+                faces.push(face.map(|index| index as u32));
+            }
+        }
+    }
+    faces
+}
+
+/// Every triangle in four, new vertices on the unit sphere.
+fn subdivided(vertices: &mut Vec<Vec3>, triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {
+    let mut middles = std::collections::HashMap::new();
+    let mut middle = |a: u32, b: u32| {
+        *middles.entry((a.min(b), a.max(b))).or_insert_with(|| {
+            vertices.push(((vertices[a as usize] + vertices[b as usize]) * 0.5).normalize());
+            vertices.len() as u32 - 1
+        })
+    };
+    let mut finer = Vec::with_capacity(4 * triangles.len());
+    for &[a, b, c] in triangles {
+        let [ab, bc, ca] = [middle(a, b), middle(b, c), middle(c, a)];
+        finer.extend([[a, ab, ca], [b, bc, ab], [c, ca, bc], [ab, bc, ca]]);
+    }
+    finer
+}
+
+/// `count` triangles of about the given size, uniformly in the unit cube: the content that grids are good at.
+pub fn soup(count: usize, size: f32) -> (Vec<Vec3>, Vec<[u32; 3]>) {
+    let mut state = 1u64;
+    let mut uniform = move || {
+        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (state >> 40) as f32 / (1u64 << 24) as f32
+    };
+    let mut point = move || Vec3::new(uniform(), uniform(), uniform());
+    let mut vertices = Vec::with_capacity(3 * count);
+    for _ in 0..count {
+        let centre = point();
+        vertices.extend([(); 3].map(|()| centre + (point() - 0.5) * size));
+    }
+    let triangles = (0..count as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    (vertices, triangles)
+}
+
+/// The accelerator of every method over a mesh, built with two threads and default settings.
+pub fn build_all(mesh: &std::sync::Arc<Mesh>) -> Vec<Accelerator> {
+    let build = |method| Accelerator::build(mesh.clone(), method, &Config::default(), 2, &Job::new()).unwrap();
+    Method::ALL.map(build).into()
 }

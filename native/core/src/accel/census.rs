@@ -1,0 +1,105 @@
+//! What a structure consists of, in numbers.
+
+use super::{
+    config::CostConstants,
+    places::{Place, levels},
+    structure::{Grid, Structure, Target},
+};
+use crate::{bounds::Bounds, triangle::LANES};
+
+/// Counts and sizes of a structure.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Census {
+    /// Wide branch nodes.
+    pub nodes: usize,
+    /// Leaves: blocks of up to eight triangles.
+    pub leaves: usize,
+    /// Grids.
+    pub grids: usize,
+    /// Cells of all grids.
+    pub cells: usize,
+    /// Cells without a triangle.
+    pub empty_cells: usize,
+    /// Triangles in leaves and in grid cells, each as often as it occurs.
+    pub references: usize,
+    /// Bytes held, without the mesh.
+    pub bytes: usize,
+    /// Depth of the deepest leaf or grid; the root has depth 0.
+    pub max_depth: usize,
+    /// Branches, leaves and grids at every depth.
+    pub depth_histogram: Vec<usize>,
+    /// What a line that meets the scene's box costs when it is followed to its end, by the surface area heuristic, in
+    /// visits of a wide node: see [`sah_cost`].
+    pub sah_cost: f64,
+}
+
+impl Census {
+    /// Count a structure over a mesh with these bounds.
+    pub fn of(structure: &Structure, bounds: &Bounds) -> Self {
+        let mut census = Self { bytes: structure.bytes(), ..Self::default() };
+        for level in levels(structure, bounds) {
+            census.depth_histogram.push(level.len());
+            level.iter().for_each(|place| census.add(structure, place.target));
+        }
+        census.max_depth = census.depth_histogram.len().saturating_sub(1);
+        census.sah_cost = sah_cost(structure, bounds);
+        census
+    }
+
+    fn add(&mut self, structure: &Structure, target: Target) {
+        match target {
+            Target::Branch(_) => self.nodes += 1,
+            Target::Leaf { count, .. } => {
+                self.leaves += 1;
+                self.references += count as usize;
+            }
+            Target::Grid(index) => self.add_grid(structure, &structure.grids[index as usize]),
+            Target::Empty => {}
+        }
+    }
+
+    fn add_grid(&mut self, structure: &Structure, grid: &Grid) {
+        let counts = (0..grid.cell_count()).map(|cell| structure.cell(grid, cell).len());
+        self.grids += 1;
+        self.cells += grid.cell_count();
+        self.empty_cells += counts.clone().filter(|&count| count == 0).count();
+        self.references += counts.sum::<usize>();
+    }
+}
+
+/// The surface area heuristic of MacDonald and Booth, "Heuristics for Ray Tracing using Space Subdivision", The Visual
+/// Computer 6(3), 1990: a line that meets the scene's box meets a convex box inside with the ratio of their areas as
+/// probability. A wide node counts 1; blocks, cell steps and gathered groups count as [`CostConstants::default`]
+/// relates them to it, on every machine, so that numbers compare.
+pub fn sah_cost(structure: &Structure, bounds: &Bounds) -> f64 {
+    let scene = half_area(bounds);
+    let places = levels(structure, bounds).flatten();
+    let total: f64 = places.map(|place| half_area(&place.bounds) * work(structure, &place)).sum();
+    total / scene.max(f64::MIN_POSITIVE)
+}
+
+fn half_area(bounds: &Bounds) -> f64 {
+    let [x, y, z] = bounds.extent().as_dvec3().to_array();
+    x * y + y * z + z * x
+}
+
+/// What meeting a place costs, apart from what lies below it.
+fn work(structure: &Structure, place: &Place) -> f64 {
+    let cost = CostConstants::default();
+    match place.target {
+        Target::Branch(_) => 1.0,
+        Target::Leaf { .. } => cost.block_ns / cost.node_ns,
+        Target::Grid(index) => {
+            let grid = &structure.grids[index as usize];
+            let share = half_area(&grid.cell_bounds(0)) / half_area(&place.bounds).max(f64::MIN_POSITIVE);
+            share * cells_ns(structure, grid, &cost) / cost.node_ns
+        }
+        Target::Empty => 0.0,
+    }
+}
+
+/// What walking through every cell of a grid once would cost.
+fn cells_ns(structure: &Structure, grid: &Grid, cost: &CostConstants) -> f64 {
+    let groups = (0..grid.cell_count()).map(|cell| structure.cell(grid, cell).len().div_ceil(LANES));
+    grid.cell_count() as f64 * cost.cell_ns + groups.sum::<usize>() as f64 * cost.gather_ns
+}

@@ -1,0 +1,42 @@
+//! What the hybrids decided, and on what evidence.
+
+use crate::bounds::Bounds;
+
+/// What becomes of a node.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Verdict {
+    /// It divides, and its children are decided on.
+    Split = 0,
+    /// It becomes a grid.
+    Grid = 1,
+    /// Its triangles are tested one and all.
+    Leaf = 2,
+}
+
+/// One node's verdict with all it was based on. Numbers that the method does not use are NaN.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Decision {
+    /// Tight box of the node, in the mesh's own coordinates.
+    pub bounds: Bounds,
+    /// Depth in the binary tree; the root has 0.
+    pub depth: u32,
+    /// Triangles in the node.
+    pub primitives: u32,
+    /// Sample rays traced through it; 0 where it was outside the window of sizes for grids.
+    pub rays: u32,
+    /// How many of them hit.
+    pub hits: u32,
+    /// Index of dispersion of the hits over the strata of the box's surface.
+    pub spread: f32,
+    /// Least share of hits of a uniform node.
+    pub hit_threshold: f32,
+    /// Greatest spread of a uniform node.
+    pub spread_threshold: f32,
+    /// Expected nanoseconds of building the node as a grid and tracing the rays to come through it.
+    pub cost_grid: f32,
+    /// Expected nanoseconds of tracing the rays to come through the node's subtree.
+    pub cost_bvh: f32,
+    /// What it became.
+    pub verdict: Verdict,
+}

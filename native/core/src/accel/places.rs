@@ -1,0 +1,67 @@
+//! Every place of a structure, level by level: what is there, in which box, how deep.
+
+use glam::Vec3;
+
+use super::structure::{Grid, Node, NodeRef, Structure, Target};
+use crate::bounds::Bounds;
+
+/// A branch, leaf or grid within a structure.
+#[derive(Debug, Clone, Copy)]
+pub struct Place {
+    /// What it is.
+    pub target: Target,
+    /// Its box, relative to the centre of the domain.
+    pub bounds: Bounds,
+}
+
+/// The places of all levels, from the root down; each level in the order of its parents. `bounds` is the scene's box,
+/// in the mesh's own coordinates.
+pub fn levels<'a>(structure: &'a Structure, bounds: &Bounds) -> impl Iterator<Item = Vec<Place>> + use<'a> {
+    let centre = structure.domain.centre;
+    let bounds = Bounds { lower: bounds.lower - centre, upper: bounds.upper - centre };
+    let root = place(structure.root, bounds).into_iter().collect();
+    let below = |level: &Vec<Place>| level.iter().flat_map(|place| children(structure, place)).collect();
+    std::iter::successors(Some(root), move |level| Some(below(level)))
+        .take_while(|level: &Vec<Place>| !level.is_empty())
+}
+
+fn place(reference: NodeRef, bounds: Bounds) -> Option<Place> {
+    let target = reference.target();
+    (target != Target::Empty).then_some(Place { target, bounds })
+}
+
+/// The places right below one.
+pub fn children<'a>(structure: &'a Structure, place: &Place) -> impl Iterator<Item = Place> + use<'a> {
+    let node = match place.target {
+        Target::Branch(index) => Some(&structure.nodes[index as usize]),
+        _ => None,
+    };
+    node.into_iter()
+        .flat_map(|node| (0..node.len()).filter_map(|lane| self::place(node.child[lane], node.bounds(lane))))
+}
+
+impl Node {
+    /// The box of a child, relative to the centre of the domain.
+    pub fn bounds(&self, lane: usize) -> Bounds {
+        let corner = |first: usize| Vec3::from_array(std::array::from_fn(|k| self.plane[first + k][lane]));
+        Bounds { lower: corner(0), upper: corner(3) }
+    }
+}
+
+impl Grid {
+    /// The box of a cell, relative to the centre of the domain.
+    pub fn cell_bounds(&self, index: usize) -> Bounds {
+        let [x, y, z] = self.cell_at(index);
+        let corner = |step: u32| {
+            let planes = [x + step, y + step, z + step];
+            Vec3::from_array(std::array::from_fn(|k| self.lower[k] + planes[k] as f32 * self.cell[k]))
+        };
+        Bounds { lower: corner(0), upper: corner(1) }
+    }
+
+    /// Which cell along each axis has an index.
+    pub fn cell_at(&self, index: usize) -> [u32; 3] {
+        let [columns, rows, _] = self.resolution.map(|r| r as usize);
+        [index % columns, index / columns % rows, index / (columns * rows)].map(|c| c as u32)
+    }
+}
