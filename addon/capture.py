@@ -7,11 +7,10 @@ its settings, and its Render Result stay as they are. The copy shares objects an
 
 import contextlib
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 
 import bpy
 
-from .errors import CaptureError
+from .errors import CaptureError, NoCameraError
 from .export import export_scene
 from .scene_data import SceneData
 
@@ -33,12 +32,12 @@ def export_frame(
     `resolution` replaces the frame's width and height in pixels; `border=False` exports the whole frame.
     Raises what `export_scene` raises, and CaptureError where a render cannot start.
     """
+    if scene.camera is None:
+        raise NoCameraError(scene.name)
     layer = view_layer or next((layer for layer in scene.view_layers if layer.use), scene.view_layers[0])
     with _copy(scene) as copy:
-        _prepare(copy, resolution, border)
-        copy.view_layers[layer.name].use = True
-        data = _export(copy, layer.name)
-    return replace(data, name=scene.name)
+        _prepare(copy, layer.name, resolution, border)
+        return _export(copy, scene.name)
 
 
 def taken(depsgraph: bpy.types.Depsgraph) -> bool:
@@ -49,7 +48,7 @@ def taken(depsgraph: bpy.types.Depsgraph) -> bool:
     return True
 
 
-def _export(scene: bpy.types.Scene, view_layer: str) -> SceneData:
+def _export(scene: bpy.types.Scene, name: str) -> SceneData:
     global _take
     outcome: list[SceneData | Exception] = []
 
@@ -57,14 +56,14 @@ def _export(scene: bpy.types.Scene, view_layer: str) -> SceneData:
         if outcome:  # the second eye of a stereoscopic scene
             return
         try:
-            outcome.append(export_scene(depsgraph))
+            outcome.append(export_scene(depsgraph, name))
         except Exception as error:  # noqa: BLE001 - raised again by the caller, outside of the render
             outcome.append(error)
 
     _take = take
     try:
         with _silent_handlers():
-            bpy.ops.render.render("EXEC_DEFAULT", scene=scene.name, layer=view_layer)
+            bpy.ops.render.render("EXEC_DEFAULT", scene=scene.name)
     except RuntimeError as error:
         raise CaptureError(str(error).strip()) from error
     finally:
@@ -76,9 +75,12 @@ def _export(scene: bpy.types.Scene, view_layer: str) -> SceneData:
     return outcome[0]
 
 
-def _prepare(scene: bpy.types.Scene, resolution: tuple[int, int] | None, border: bool) -> None:
-    """Make the copy render with our engine alone."""
+def _prepare(scene: bpy.types.Scene, view_layer: str, resolution: tuple[int, int] | None, border: bool) -> None:
+    """Make the copy render one view layer, with our engine alone."""
+    for layer in scene.view_layers:
+        layer.use = layer.name == view_layer
     render = scene.render
+    render.use_single_layer = False
     render.engine = "ESPALIER"
     render.use_compositing = render.use_sequencer = False
     render.use_border = render.use_border and border

@@ -9,7 +9,7 @@ import time
 import bpy
 import numpy as np
 
-from ..errors import NonFiniteGeometryError
+from ..errors import NoGeometryError, NonFiniteGeometryError
 from ..scene_data import GeometryData, SceneData
 from .camera import read_camera
 from .flatten import Placement, flatten
@@ -20,8 +20,8 @@ from .notes import Notes
 from .objects import Objects, note_collections
 
 
-def export_scene(depsgraph: bpy.types.Depsgraph) -> SceneData:
-    """One frame of one view layer of an evaluated render depsgraph.
+def export_scene(depsgraph: bpy.types.Depsgraph, name: str | None = None) -> SceneData:
+    """One frame of one view layer of an evaluated render depsgraph. `name` stands for the scene's own.
 
     Raises NoCameraError, UnsupportedCameraError, NoGeometryError, NonFiniteGeometryError, and ValueError for a
     viewport's depsgraph, whose geometry may differ from the render's: use `capture.export_frame` there.
@@ -32,14 +32,17 @@ def export_scene(depsgraph: bpy.types.Depsgraph) -> SceneData:
     scene, notes = depsgraph.scene, Notes()
     images = Images(notes)
     materials = Materials(images, notes)
-    camera = read_camera(scene, notes)
+    name = name or scene.name
+    camera = read_camera(scene, name, notes)
     note_collections(depsgraph.view_layer, notes)
     objects = Objects(depsgraph, materials, notes)
     placements = objects.placements
+    if not placements:
+        raise NoGeometryError(name, depsgraph.view_layer.name)
     geometry = flatten(placements)
     _require_finite(geometry, placements)
     return SceneData(
-        name=scene.name,
+        name=name,
         view_layer=depsgraph.view_layer.name,
         frame=scene.frame_current,
         geometry=geometry,

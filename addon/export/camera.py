@@ -10,11 +10,11 @@ from .notes import Notes
 KINDS = {"PERSP": "perspective", "ORTHO": "orthographic"}
 
 
-def read_camera(scene: bpy.types.Scene, notes: Notes) -> CameraData:
-    """The scene's active camera. Raises NoCameraError or UnsupportedCameraError."""
+def read_camera(scene: bpy.types.Scene, name: str, notes: Notes) -> CameraData:
+    """The active camera of the scene that errors call `name`. Raises NoCameraError or UnsupportedCameraError."""
     holder = scene.camera
     if holder is None or holder.type != "CAMERA":
-        raise NoCameraError(scene.name)
+        raise NoCameraError(name)
     camera = holder.data
     if camera.type not in KINDS:
         raise UnsupportedCameraError(holder.name, camera.type)

@@ -2,12 +2,11 @@
 
 import bpy
 
-from ..errors import NoGeometryError
 from ..scene_data import LightData
 from .flatten import Placement
 from .lights import read_light
 from .materials import Materials
-from .meshes import read_mesh
+from .meshes import LocalMesh, read_mesh
 from .notes import Notes
 
 UNSUPPORTED = {
@@ -23,7 +22,6 @@ class Objects:
     """Meshes, each read once with all its instances, and lights of a render depsgraph."""
 
     def __init__(self, depsgraph: bpy.types.Depsgraph, materials: Materials, notes: Notes) -> None:
-        """Raises NoGeometryError where nothing that renders has a face."""
         self.lights: list[LightData] = []
         self._materials = materials
         self._notes = notes
@@ -32,8 +30,6 @@ class Objects:
         for instance in depsgraph.object_instances:
             if instance.show_self:
                 self._visit(instance)
-        if not self.placements:
-            raise NoGeometryError(depsgraph.scene.name, depsgraph.view_layer.name)
 
     @property
     def placements(self) -> list[Placement]:
@@ -54,7 +50,7 @@ class Objects:
         mesh = thing.data
         key = mesh.as_pointer()
         if key not in self._placements:
-            local = read_mesh(mesh)
+            local = _read_edited(thing) if mesh.is_editmode else read_mesh(mesh)
             self._placements[key] = None if local is None else Placement(local)
         placement = self._placements[key]
         if placement is not None:
@@ -80,6 +76,14 @@ class Objects:
             for system in thing.particle_systems
         ):
             self._notes.add(f"Object '{thing.name}': hair particles are left out")
+
+
+def _read_edited(thing: bpy.types.Object) -> LocalMesh | None:
+    """The mesh of an object in edit mode, whose arrays are empty until Blender converts its edits."""
+    try:
+        return read_mesh(thing.to_mesh())
+    finally:
+        thing.to_mesh_clear()
 
 
 def note_collections(view_layer: bpy.types.ViewLayer, notes: Notes) -> None:
