@@ -1,10 +1,11 @@
-"""Lets every test import the package `espalier` from this checkout, wherever an installed copy may be."""
+"""Lets every test import `espalier` and `espalier_scenes` from this checkout, wherever installed copies may be."""
 
 import importlib.util
 import sys
 from pathlib import Path
 
-ADDON = Path(__file__).resolve().parent.parent / "addon"
+ROOT = Path(__file__).resolve().parent.parent
+FOLDERS = {"espalier": ROOT / "addon", "espalier_scenes": ROOT / "scenes"}
 
 
 def _load_package(name: str, folder: Path) -> None:
@@ -19,5 +20,6 @@ def _load_package(name: str, folder: Path) -> None:
     spec.loader.exec_module(module)
 
 
-if "espalier" not in sys.modules:
-    _load_package("espalier", ADDON)
+for package, room in FOLDERS.items():
+    if package not in sys.modules:
+        _load_package(package, room)

@@ -27,7 +27,7 @@ def read_camera(scene: bpy.types.Scene, name: str, notes: Notes) -> CameraData:
         notes.add("Motion blur is ignored")
     return CameraData(
         name=holder.name,
-        kind=KINDS[camera.type],  # type: ignore[arg-type]
+        kind=KINDS[camera.type],
         matrix=np.array(holder.matrix_world.normalized(), np.float32),
         resolution=resolution(render),
         lens=camera.lens,

@@ -35,7 +35,7 @@ class Images:
         key = (name, interpolation, extension)
         if key not in self._indices:
             self._indices[key] = len(self.textures)
-            self.textures.append(TextureData(name, pixels, interpolation, extension))  # type: ignore[arg-type]
+            self.textures.append(TextureData(name, pixels, interpolation, extension))
         return self._indices[key]
 
     def mean_color(self, image: bpy.types.Image | None) -> Color | None:
