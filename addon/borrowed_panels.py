@@ -1,6 +1,7 @@
 """Blender's own panels that make sense for Espalier too: camera, light, material, world, output and the like."""
 
 from collections.abc import Iterator
+from typing import Any
 
 import bpy
 
@@ -26,7 +27,7 @@ EEVEE_PANELS = {
 }
 """EEVEE's panels for what Espalier reads, and for which there is no shared one."""
 
-_borrowed: list[type[bpy.types.Panel]] = []
+_borrowed: list[Any] = []
 
 
 def register() -> None:
@@ -43,16 +44,16 @@ def unregister() -> None:
     _borrowed.clear()
 
 
-def _panels() -> Iterator[type[bpy.types.Panel]]:
+def _panels() -> Iterator[Any]:
     """Every panel to show that does not yet show for Espalier."""
-    waiting = [bpy.types.Panel]
+    waiting: list[Any] = [bpy.types.Panel]
     while waiting:
         subclasses = waiting.pop().__subclasses__()
         waiting.extend(subclasses)
         yield from (panel for panel in subclasses if _suits(panel))
 
 
-def _suits(panel: type[bpy.types.Panel]) -> bool:
+def _suits(panel: Any) -> bool:
     engines = getattr(panel, "COMPAT_ENGINES", ())
     name = panel.__name__
     if ENGINE in engines:

@@ -7,6 +7,7 @@ its settings, and its Render Result stay as they are. The copy shares objects an
 
 import contextlib
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import bpy
 
@@ -79,7 +80,7 @@ def _prepare(scene: bpy.types.Scene, view_layer: str, resolution: tuple[int, int
     """Make the copy render one view layer, with our engine alone."""
     for layer in scene.view_layers:
         layer.use = layer.name == view_layer
-    render = scene.render
+    render: Any = scene.render
     render.use_single_layer = False
     render.engine = "ESPALIER"
     render.use_compositing = render.use_sequencer = False

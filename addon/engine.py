@@ -1,6 +1,7 @@
 """The render engine: a shell that exports a view layer, watches a run and hands its image to Blender."""
 
 import traceback
+from typing import Any
 
 import bpy
 import numpy as np
@@ -24,9 +25,7 @@ class ESPALIER_RenderEngine(bpy.types.RenderEngine):
     bl_use_eevee_viewport = True
     bl_use_shading_nodes_custom = False
 
-    def update_render_passes(
-        self, scene: bpy.types.Scene | None = None, renderlayer: bpy.types.ViewLayer | None = None
-    ) -> None:
+    def update_render_passes(self, scene: Any = None, renderlayer: Any = None) -> None:
         """Tell Blender, and through it the compositor, of the passes."""
         self.register_pass(scene, renderlayer, "Combined", 4, "RGBA", "COLOR")
         self.register_pass(scene, renderlayer, "Depth", 1, "Z", "VALUE")
@@ -34,19 +33,19 @@ class ESPALIER_RenderEngine(bpy.types.RenderEngine):
         if scene.espalier.cost_pass:
             self.register_pass(scene, renderlayer, "Cost", 1, "X", "VALUE")
 
-    def render(self, depsgraph: bpy.types.Depsgraph) -> None:
+    def render(self, depsgraph: Any) -> None:  # type: ignore[override] # the stubs have render() return settings
         """Render one view layer. An error ends the render with its message: Blender would not stop for an exception."""
         try:
             if not capture.taken(depsgraph):
                 self._render(depsgraph)
         except EspalierAddonError as error:
-            self.error_set(str(error))
+            self._fail(str(error))
         except Exception as error:  # noqa: BLE001 - told to Blender, whose render it ends
             if not _is_native(error):
                 traceback.print_exc()
-            self.error_set(f"Espalier: {error}")
+            self._fail(f"{type(error).__name__}: {error}")
 
-    def _render(self, depsgraph: bpy.types.Depsgraph) -> None:
+    def _render(self, depsgraph: Any) -> None:
         scene = depsgraph.scene
         settings = scene.espalier
         self.update_stats("", "Espalier: export")
@@ -59,6 +58,11 @@ class ESPALIER_RenderEngine(bpy.types.RenderEngine):
         run.raise_error()
         if not run.cancelled:
             self._hand_over(run.results[0], depsgraph.view_layer.name, scene.render.film_transparent)
+
+    def _fail(self, message: str) -> None:
+        """Tell an error where people look: the report raises in scripts, the other stands above the image."""
+        self.report({"ERROR"}, message)
+        self.error_set(message)
 
     def _watch(self, run: Run) -> None:
         """Show progress until the run ends; Esc cancels it."""
@@ -75,7 +79,7 @@ class ESPALIER_RenderEngine(bpy.types.RenderEngine):
         passes = {"Combined": _film(render.combined, transparent), "Depth": render.depth, "Normal": render.normal}
         if render.cost is not None:
             passes["Cost"] = render.cost
-        blender_result = self.begin_result(0, 0, width, height, layer=view_layer)
+        blender_result: Any = self.begin_result(0, 0, width, height, layer=view_layer)
         try:
             for layer_pass in blender_result.layers[0].passes:
                 if layer_pass.name in passes:

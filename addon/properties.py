@@ -16,7 +16,7 @@ from .methods import DEFAULT_METHOD, METHOD_NAMES, METHODS
 
 METHOD_ITEMS = [(method.name, method.label, method.description, index) for index, method in enumerate(METHODS)]
 METHOD_FLAGS = [(method.name, method.label, method.description, 1 << index) for index, method in enumerate(METHODS)]
-STATIC: set[str] = set()
+STATIC: Any = set()
 """Property options of a setting that cannot be animated."""
 
 
@@ -171,6 +171,7 @@ class ESPALIER_PG_settings(bpy.types.PropertyGroup):
     overlay: PointerProperty(type=ESPALIER_PG_overlay, name="Overlay", description="What is drawn over the 3D viewport")
 
 
+SCENE: Any = bpy.types.Scene
 CLASSES = (ESPALIER_PG_overlay, ESPALIER_PG_settings)
 
 
@@ -178,13 +179,11 @@ def register() -> None:
     """Register the property groups and `scene.espalier`."""
     for cls in CLASSES:
         bpy.utils.register_class(cls)
-    bpy.types.Scene.espalier = PointerProperty(
-        type=ESPALIER_PG_settings, name="Espalier", description="Settings of Espalier"
-    )
+    SCENE.espalier = PointerProperty(type=ESPALIER_PG_settings, name="Espalier", description="Settings of Espalier")
 
 
 def unregister() -> None:
     """Remove `scene.espalier` and unregister the property groups."""
-    del bpy.types.Scene.espalier
+    del SCENE.espalier
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)

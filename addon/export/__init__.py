@@ -5,6 +5,7 @@ modifiers; `capture` gets one outside of a render. Nothing in the file is change
 """
 
 import time
+from typing import Any
 
 import bpy
 import numpy as np
@@ -29,21 +30,23 @@ def export_scene(depsgraph: bpy.types.Depsgraph, name: str | None = None) -> Sce
     if depsgraph.mode != "RENDER":
         raise ValueError("export_scene needs a render depsgraph; call capture.export_frame outside of a render")
     start = time.perf_counter()
-    scene, notes = depsgraph.scene, Notes()
+    scene: Any = depsgraph.scene
+    view_layer: Any = depsgraph.view_layer
+    notes = Notes()
     images = Images(notes)
     materials = Materials(images, notes)
     name = name or scene.name
     camera = read_camera(scene, name, notes)
-    note_collections(depsgraph.view_layer, notes)
+    note_collections(view_layer, notes)
     objects = Objects(depsgraph, materials, notes)
     placements = objects.placements
     if not placements:
-        raise NoGeometryError(name, depsgraph.view_layer.name)
+        raise NoGeometryError(name, view_layer.name)
     geometry = flatten(placements)
     _require_finite(geometry, placements)
     return SceneData(
         name=name,
-        view_layer=depsgraph.view_layer.name,
+        view_layer=view_layer.name,
         frame=scene.frame_current,
         geometry=geometry,
         camera=camera,

@@ -1,5 +1,7 @@
 """The camera and the frame it looks through."""
 
+from typing import Any
+
 import bpy
 import numpy as np
 
@@ -15,7 +17,7 @@ def read_camera(scene: bpy.types.Scene, name: str, notes: Notes) -> CameraData:
     holder = scene.camera
     if holder is None or holder.type != "CAMERA":
         raise NoCameraError(name)
-    camera = holder.data
+    camera: Any = holder.data
     if camera.type not in KINDS:
         raise UnsupportedCameraError(holder.name, camera.type)
     if camera.dof.use_dof:

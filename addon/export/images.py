@@ -2,8 +2,8 @@
 
 import contextlib
 from collections.abc import Iterator
+from typing import Any
 
-import bpy
 import numpy as np
 
 from ..scene_data import Color, Float32, TextureData
@@ -24,7 +24,7 @@ class Images:
         self._pixels: dict[str, Float32 | None] = {}
         self._indices: dict[tuple[str, str, str], int] = {}
 
-    def texture(self, node: bpy.types.ShaderNodeTexImage) -> int | None:
+    def texture(self, node: Any) -> int | None:
         """Index into `textures` of an Image Texture node; None where its image is missing, which is noted."""
         pixels = self._read(node.image)
         if pixels is None:
@@ -38,7 +38,7 @@ class Images:
             self.textures.append(TextureData(name, pixels, interpolation, extension))
         return self._indices[key]
 
-    def mean_color(self, image: bpy.types.Image | None) -> Color | None:
+    def mean_color(self, image: Any) -> Color | None:
         """The mean scene-linear colour of an image; None where it is missing, which is noted."""
         pixels = self._read(image)
         if pixels is None:
@@ -51,7 +51,7 @@ class Images:
             self._notes.add(f"Image '{image}': {what} {value.title()} is traced as {fallback.title()}")
         return table.get(value, fallback)
 
-    def _read(self, image: bpy.types.Image | None) -> Float32 | None:
+    def _read(self, image: Any) -> Float32 | None:
         if image is None:
             self._notes.add("An Image Texture node has no image and is traced as pink: choose an image")
             return None
@@ -59,7 +59,7 @@ class Images:
             self._pixels[image.name_full] = self._read_pixels(image)
         return self._pixels[image.name_full]
 
-    def _read_pixels(self, image: bpy.types.Image) -> Float32 | None:
+    def _read_pixels(self, image: Any) -> Float32 | None:
         if image.source in {"SEQUENCE", "MOVIE", "TILED"}:
             self._notes.add(f"Image '{image.name}': only the {_part(image.source)} is traced")
         with _as_it_was(image):
@@ -73,7 +73,7 @@ class Images:
             image.pixels.foreach_get(pixels)
             return self._linear(image, _four_channels(pixels.reshape(height, width, -1)))
 
-    def _linear(self, image: bpy.types.Image, pixels: Float32) -> Float32:
+    def _linear(self, image: Any, pixels: Float32) -> Float32:
         """Scene-linear pixels. Blender has converted float images when it loaded them, byte images not."""
         space = image.colorspace_settings
         if image.is_float or space.name in LINEAR_SPACES or space.is_data:
@@ -108,7 +108,7 @@ def _four_channels(pixels: Float32) -> Float32:
 
 
 @contextlib.contextmanager
-def _as_it_was(image: bpy.types.Image) -> Iterator[None]:
+def _as_it_was(image: Any) -> Iterator[None]:
     """Frees pixels that were loaded only to be read, so that an export leaves the memory of images as it was."""
     loaded = image.has_data
     try:

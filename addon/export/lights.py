@@ -1,18 +1,21 @@
 """Lights and the world, in Blender's units."""
 
 import math
-from typing import Any
+from typing import Any, TypeAlias
 
 import bpy
 import numpy as np
 
 from ..scene_data import Color, LightData
 from .images import Images
-from .nodes import as_color, as_float, constant, follow, output_node
+from .nodes import Node, Path, Socket, as_color, as_float, constant, follow, output_node
 from .notes import Notes
 
+Light: TypeAlias = Any
+"""A `bpy.types.Light`. What one has depends on its kind, which Blender's type stubs cannot tell."""
 
-def read_light(light: bpy.types.Light, matrix: Any, name: str, notes: Notes) -> LightData:
+
+def read_light(light: Light, matrix: Any, name: str, notes: Notes) -> LightData:
     """A light placed by a (4, 4) light-to-world matrix. Fields a kind does not have keep their defaults."""
     color, strength = _tint(light, notes)
     return LightData(
@@ -27,19 +30,19 @@ def read_light(light: bpy.types.Light, matrix: Any, name: str, notes: Notes) -> 
     )
 
 
-def _sphere(light: bpy.types.Light) -> dict[str, Any]:
+def _sphere(light: Light) -> dict[str, Any]:
     return {"radius": light.shadow_soft_size}
 
 
-def _spot(light: bpy.types.Light) -> dict[str, Any]:
+def _spot(light: Light) -> dict[str, Any]:
     return {"radius": light.shadow_soft_size, "spot_size": light.spot_size, "spot_blend": light.spot_blend}
 
 
-def _sun(light: bpy.types.Light) -> dict[str, Any]:
+def _sun(light: Light) -> dict[str, Any]:
     return {"angle": light.angle}
 
 
-def _area(light: bpy.types.Light) -> dict[str, Any]:
+def _area(light: Light) -> dict[str, Any]:
     return {
         "shape": light.shape.lower(),
         "size": light.size,
@@ -51,9 +54,9 @@ def _area(light: bpy.types.Light) -> dict[str, Any]:
 _SHAPES = {"POINT": _sphere, "SPOT": _spot, "SUN": _sun, "AREA": _area}
 
 
-def _tint(light: bpy.types.Light, notes: Notes) -> tuple[Color, float]:
+def _tint(light: Light, notes: Notes) -> tuple[Color, float]:
     """Colour and factor of a light: its own colour, temperature, and an Emission node with constant inputs."""
-    color = tuple(light.color)
+    color: Color = tuple(light.color)
     if getattr(light, "use_temperature", False):
         color = _times(color, light.temperature_color)
     output = output_node(light.node_tree, "OUTPUT_LIGHT") if light.use_nodes and light.node_tree else None
@@ -91,7 +94,7 @@ def read_world(world: bpy.types.World | None, images: Images, notes: Notes) -> C
     return _background(world, end.node, end.path, images, notes)
 
 
-def _background(world: bpy.types.World, node: bpy.types.Node, path: Any, images: Images, notes: Notes) -> Color:
+def _background(world: bpy.types.World, node: Node, path: Path, images: Images, notes: Notes) -> Color:
     strength = constant(node.inputs["Strength"], path)
     color = constant(node.inputs["Color"], path)
     if strength is None:
@@ -102,9 +105,7 @@ def _background(world: bpy.types.World, node: bpy.types.Node, path: Any, images:
     return _times(as_color(color), (as_float(strength),) * 3)
 
 
-def _mean_background(
-    world: bpy.types.World, socket: bpy.types.NodeSocket, path: Any, images: Images, notes: Notes
-) -> Color:
+def _mean_background(world: bpy.types.World, socket: Socket, path: Path, images: Images, notes: Notes) -> Color:
     """One colour for a background that varies: an image's mean, otherwise the world's viewport colour."""
     end = follow(socket, path)
     if end.node is not None and end.node.type in {"TEX_ENVIRONMENT", "TEX_IMAGE"}:

@@ -18,7 +18,7 @@ import bpy
 
 from ..scene_data import Color, MaterialData
 from .images import Images
-from .nodes import End, Path, as_color, as_float, constant, follow
+from .nodes import End, Node, Path, Socket, as_color, as_float, constant, follow
 from .notes import Notes
 
 PINK: Color = (1.0, 0.0, 1.0)
@@ -85,7 +85,7 @@ class _Reader:
             return self._plain
         return read(self, end.node, end.path)
 
-    def _principled(self, node: bpy.types.Node, path: Path) -> MaterialData:
+    def _principled(self, node: Node, path: Path) -> MaterialData:
         self._normal(node)
         self._note(as_float(self._value(node, path, "Alpha", "alpha")) < 1.0, "alpha")
         for name in IGNORED_WEIGHTS:
@@ -98,21 +98,21 @@ class _Reader:
             emission=self._emitted(node.inputs["Emission Color"], path, strength),
         )
 
-    def _diffuse(self, node: bpy.types.Node, path: Path) -> MaterialData:
+    def _diffuse(self, node: Node, path: Path) -> MaterialData:
         self._normal(node)
         return replace(self._base_color(node.inputs["Color"], path), roughness=1.0)
 
-    def _glossy(self, node: bpy.types.Node, path: Path) -> MaterialData:
+    def _glossy(self, node: Node, path: Path) -> MaterialData:
         self._normal(node)
         roughness = as_float(self._value(node, path, "Roughness", "roughness"))
         return replace(self._base_color(node.inputs["Color"], path), metallic=1.0, roughness=roughness)
 
-    def _emission(self, node: bpy.types.Node, path: Path) -> MaterialData:
+    def _emission(self, node: Node, path: Path) -> MaterialData:
         strength = as_float(self._value(node, path, "Strength", "emission strength"))
         emission = self._emitted(node.inputs["Color"], path, strength)
         return replace(self._plain, base_color=BLACK, emission=emission)
 
-    def _add(self, node: bpy.types.Node, path: Path) -> MaterialData:
+    def _add(self, node: Node, path: Path) -> MaterialData:
         """A shader plus an emission; two shaders that both reflect have no such form."""
         first, second = follow(node.inputs[0], path), follow(node.inputs[1], path)
         if second.node is None or _is_emission(first):
@@ -126,7 +126,7 @@ class _Reader:
         red, green, blue = (a + b for a, b in zip(one.emission, other.emission, strict=True))
         return replace(one, emission=(red, green, blue))
 
-    def _mix(self, node: bpy.types.Node, path: Path) -> MaterialData:
+    def _mix(self, node: Node, path: Path) -> MaterialData:
         """The shader that a factor of 0 or 1 leaves, or the one mixed with a transparent shader."""
         ends = follow(node.inputs[1], path), follow(node.inputs[2], path)
         factor = constant(node.inputs[0], path)
@@ -139,7 +139,7 @@ class _Reader:
         self._note(True, "a mix of shaders")
         return self._plain
 
-    def _base_color(self, socket: bpy.types.NodeSocket, path: Path) -> MaterialData:
+    def _base_color(self, socket: Socket, path: Path) -> MaterialData:
         """The plain material with the base colour that reaches a socket."""
         end = follow(socket, path)
         if end.node is not None and end.node.type == "TEX_IMAGE" and end.socket.name == "Color":
@@ -148,14 +148,14 @@ class _Reader:
         self._note(color is None, "base color")
         return self._plain if color is None else replace(self._plain, base_color=as_color(color))
 
-    def _textured(self, node: bpy.types.ShaderNodeTexImage, path: Path) -> MaterialData:
+    def _textured(self, node: Node, path: Path) -> MaterialData:
         if node.projection != "FLAT" or not self._on_render_uvs(node, path):
             self._note(True, "texture coordinates")
             return self._plain
         texture = self._images.texture(node)
         return replace(self._plain, base_color=PINK) if texture is None else replace(self._plain, texture=texture)
 
-    def _on_render_uvs(self, node: bpy.types.ShaderNodeTexImage, path: Path) -> bool:
+    def _on_render_uvs(self, node: Node, path: Path) -> bool:
         """Whether an image lies on a UV map; a map chosen by name is traced as the active render map, and noted."""
         end = follow(node.inputs["Vector"], path)
         if end.node is None:
@@ -165,26 +165,27 @@ class _Reader:
             return True
         return end.node.type == "TEX_COORD" and end.socket.name == "UV"
 
-    def _emitted(self, socket: bpy.types.NodeSocket, path: Path, strength: float) -> Color:
+    def _emitted(self, socket: Socket, path: Path, strength: float) -> Color:
         """Radiance of the colour that reaches a socket times a strength."""
         if strength == 0.0:
             return BLACK
         color = constant(socket, path)
         if color is None:
             self._note(True, "emission color")
-            end = follow(socket, path)
-            image = self._images.mean_color(end.node.image) if end.node.type == "TEX_IMAGE" else socket.default_value
-            color = PINK if image is None else image
+            node: Node = follow(socket, path).node
+            color = socket.default_value
+            if node.type == "TEX_IMAGE":
+                color = self._images.mean_color(node.image) or PINK
         red, green, blue = as_color(color)
         return red * strength, green * strength, blue * strength
 
-    def _value(self, node: bpy.types.Node, path: Path, name: str, what: str) -> float:
+    def _value(self, node: Node, path: Path, name: str, what: str) -> float:
         """An input's constant; where it varies, the value it has when unlinked, and a note."""
         value = constant(node.inputs[name], path)
         self._note(value is None, what)
         return node.inputs[name].default_value if value is None else value
 
-    def _normal(self, node: bpy.types.Node) -> None:
+    def _normal(self, node: Node) -> None:
         self._note(node.inputs["Normal"].is_linked, "normal map")
 
     def _note(self, true: bool, what: str) -> None:
@@ -196,7 +197,7 @@ def _is_emission(end: End) -> bool:
     return end.node is not None and end.node.type == "EMISSION"
 
 
-SHADERS: dict[str, Callable[[_Reader, bpy.types.Node, Path], MaterialData]] = {
+SHADERS: dict[str, Callable[[_Reader, Node, Path], MaterialData]] = {
     "BSDF_PRINCIPLED": _Reader._principled,
     "BSDF_DIFFUSE": _Reader._diffuse,
     "BSDF_GLOSSY": _Reader._glossy,

@@ -1,6 +1,7 @@
 """Reads one evaluated mesh into numpy arrays, in the mesh's own space, each array with one bulk call."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import bpy
 import numpy as np
@@ -25,8 +26,8 @@ class LocalMesh:
     slots: NDArray[np.int32] | None  # (m,)
 
 
-def read_mesh(mesh: bpy.types.Mesh) -> LocalMesh | None:
-    """The mesh's arrays, or None where it has no face."""
+def read_mesh(mesh: Any) -> LocalMesh | None:
+    """The arrays of a `bpy.types.Mesh`, or None where it has no face."""
     if len(mesh.polygons) == 0:
         return None
     mesh.calc_loop_triangles()
@@ -43,9 +44,9 @@ def read_mesh(mesh: bpy.types.Mesh) -> LocalMesh | None:
     )
 
 
-def _read(data: bpy.types.bpy_prop_collection, name: str, dtype: type, shape: tuple[int, ...]) -> NDArray:
-    """A property of every element of a collection, as an array."""
-    values = np.empty(shape, dtype)
+def _read(data: Any, name: str, dtype: type, shape: tuple[int, ...]) -> NDArray[Any]:
+    """A property of every element of a Blender collection, as an array."""
+    values: NDArray[Any] = np.empty(shape, dtype)
     data.foreach_get(name, values.reshape(-1))
     return values
 

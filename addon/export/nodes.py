@@ -1,28 +1,33 @@
 """Follows links of a shader node tree to the node that a value really comes from, through groups and reroutes."""
 
-from typing import Any, NamedTuple
+from collections.abc import Iterable
+from typing import Any, NamedTuple, TypeAlias
 
 import bpy
 
-Path = tuple[bpy.types.Node, ...]
+Node: TypeAlias = Any
+"""A `bpy.types.Node`. What one has depends on its kind, which Blender's type stubs cannot tell."""
+Socket: TypeAlias = Any
+"""A `bpy.types.NodeSocket`, likewise."""
+Path = tuple[Node, ...]
 """The group nodes one is inside of, outermost first."""
 
 
 class End(NamedTuple):
     """Where the links into a socket end: at a node's output, or (node is None) at an unlinked input's own value."""
 
-    node: bpy.types.Node | None
-    socket: bpy.types.NodeSocket
+    node: Node | None
+    socket: Socket
     path: Path
 
 
-def output_node(tree: bpy.types.NodeTree, kind: str) -> bpy.types.Node | None:
+def output_node(tree: bpy.types.NodeTree, kind: str) -> Node | None:
     """The active node of a type such as 'OUTPUT_WORLD', or the first one, or None."""
     nodes = [node for node in tree.nodes if node.type == kind and not node.mute]
     return next((node for node in nodes if getattr(node, "is_active_output", False)), nodes[0] if nodes else None)
 
 
-def follow(socket: bpy.types.NodeSocket, path: Path = ()) -> End:
+def follow(socket: Socket, path: Path = ()) -> End:
     """The end of the links into an input socket."""
     while socket.is_linked and not socket.is_output:
         link = socket.links[0]
@@ -35,9 +40,7 @@ def follow(socket: bpy.types.NodeSocket, path: Path = ()) -> End:
     return End(None, socket, path)
 
 
-def _through(
-    node: bpy.types.Node, output: bpy.types.NodeSocket, path: Path
-) -> tuple[bpy.types.NodeSocket, Path] | None:
+def _through(node: Node, output: Socket, path: Path) -> tuple[Socket, Path] | None:
     """The input that a node passes on to `output` unchanged, with the path it lies on; None for a real node."""
     if node.mute:
         passed = next((link.from_socket for link in node.internal_links if link.to_socket == output), None)
@@ -52,12 +55,12 @@ def _through(
     return None
 
 
-def _same(sockets: bpy.types.bpy_prop_collection, wanted: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
+def _same(sockets: Iterable[Socket], wanted: Socket) -> Socket:
     """The socket with the identifier of `wanted`, which is how a group's outside and inside match."""
     return next(socket for socket in sockets if socket.identifier == wanted.identifier)
 
 
-def constant(socket: bpy.types.NodeSocket, path: Path = ()) -> Any | None:
+def constant(socket: Socket, path: Path = ()) -> Any | None:
     """The value that reaches an input if it is the same everywhere: a float or (r, g, b, a). None if it varies."""
     end = follow(socket, path)
     if end.node is None:

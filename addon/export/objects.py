@@ -1,5 +1,7 @@
 """Walks what renders in a view layer, and gathers meshes with their instances, and lights."""
 
+from typing import Any
+
 import bpy
 
 from ..scene_data import LightData
@@ -38,7 +40,7 @@ class Objects:
 
     def _visit(self, instance: bpy.types.DepsgraphObjectInstance) -> None:
         """Curves, text, surfaces and metaballs come twice, as themselves and as a mesh: only the mesh is taken."""
-        thing = instance.object
+        thing: Any = instance.object
         if thing.type == "MESH":
             self._mesh(thing, instance)
         elif thing.type == "LIGHT":
@@ -46,7 +48,7 @@ class Objects:
         elif thing.type in UNSUPPORTED:
             self._notes.add(f"Object '{thing.name}' is {UNSUPPORTED[thing.type]} and is left out")
 
-    def _mesh(self, thing: bpy.types.Object, instance: bpy.types.DepsgraphObjectInstance) -> None:
+    def _mesh(self, thing: Any, instance: Any) -> None:
         mesh = thing.data
         key = mesh.as_pointer()
         if key not in self._placements:
@@ -56,7 +58,7 @@ class Objects:
         if placement is not None:
             placement.add(instance.matrix_world.copy(), self._slots_of(thing, key))
 
-    def _slots_of(self, thing: bpy.types.Object, mesh: int) -> tuple[int, ...]:
+    def _slots_of(self, thing: Any, mesh: int) -> tuple[int, ...]:
         """Material of every slot; kept by original object and mesh, as instances have passing objects."""
         key = (thing.original.as_pointer(), mesh)
         if key not in self._slots:
@@ -64,7 +66,7 @@ class Objects:
             self._slots[key] = tuple(self._materials.index(slot.material) for slot in thing.material_slots) or (0,)
         return self._slots[key]
 
-    def _note_ignored(self, thing: bpy.types.Object) -> None:
+    def _note_ignored(self, thing: Any) -> None:
         """Note what an object asks for and a trace does not do."""
         if thing.is_holdout or thing.is_shadow_catcher:
             self._notes.add(f"Object '{thing.name}': holdout and shadow catcher are ignored; it is traced as it is")
@@ -78,7 +80,7 @@ class Objects:
             self._notes.add(f"Object '{thing.name}': hair particles are left out")
 
 
-def _read_edited(thing: bpy.types.Object) -> LocalMesh | None:
+def _read_edited(thing: Any) -> LocalMesh | None:
     """The mesh of an object in edit mode, whose arrays are empty until Blender converts its edits."""
     try:
         return read_mesh(thing.to_mesh())

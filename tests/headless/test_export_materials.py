@@ -228,3 +228,14 @@ def test_a_material_without_a_shader_is_black():
     new = building.material("M")
     new.node_tree.links.clear()
     assert exported(new)[0].base_color == (0.0, 0.0, 0.0)
+
+
+def test_an_emission_color_from_an_image_is_its_mean():
+    new = building.material("M", Emission_Strength=2.0)
+    pixels = [[(1, 0, 0, 1), (0, 0.5, 0, 1)]]
+    linked(new, "Emission Color", "ShaderNodeTexImage").image = building.image(
+        "Image", pixels, float_buffer=True, space="Linear Rec.709"
+    )
+    material, data = exported(new)
+    np.testing.assert_allclose(material.emission, (1.0, 0.5, 0.0), atol=1e-6)
+    assert data.warnings == ("Material 'M': approximated emission color",)
