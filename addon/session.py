@@ -13,7 +13,7 @@ from .errors import BusyError
 from .run import MethodResult, Options, Run
 from .scene_data import SceneData
 
-__all__ = ["MethodResult", "Options", "Run", "Session", "clear", "of", "start"]
+__all__ = ["MethodResult", "Options", "Run", "Session", "clear", "drop", "of", "start"]
 
 CANCEL_SECONDS = 1.0
 """How long to wait for a cancelled thread when its handles are dropped; it ends within 0.2 s."""
@@ -60,6 +60,13 @@ def start(scene: bpy.types.Scene, data: SceneData, method_names: Sequence[str], 
     session = Session(run.start(), _revision)
     _sessions[scene.session_uid] = session
     return session
+
+
+def drop(scene_uid: int) -> None:
+    """Drop the handles of a scene; what still runs is cancelled."""
+    session = _sessions.pop(scene_uid, None)
+    if session is not None:
+        session.run.cancel()
 
 
 def clear() -> None:

@@ -1,0 +1,27 @@
+"""Cancel what runs."""
+
+import bpy
+
+from . import task
+
+
+class ESPALIER_OT_cancel(bpy.types.Operator):
+    """Stop the work under way; methods that are finished keep their results"""
+
+    bl_idname = "espalier.cancel"
+    bl_label = "Cancel"
+
+    @classmethod
+    def poll(cls, _context: bpy.types.Context) -> bool:
+        if task.current() is None:
+            cls.poll_message_set("Nothing is under way")
+        return task.current() is not None
+
+    def execute(self, _context: bpy.types.Context) -> set[str]:
+        current = task.current()
+        if current is not None:
+            current.cancel()
+        return {"FINISHED"}
+
+
+CLASSES = (ESPALIER_OT_cancel,)

@@ -1,0 +1,142 @@
+"""Long work of the interface: one task at a time, watched by a modal operator, cancelled with Esc or a button."""
+
+from collections.abc import Callable
+from typing import Any, ClassVar, Protocol
+
+import bpy
+
+from .. import native
+from ..areas import redraw
+from ..errors import EspalierAddonError
+
+TICK_SECONDS = 0.05
+"""How often progress is looked at; the core polls for a cancel as often, so Esc is obeyed within 0.2 s."""
+
+PANELS = frozenset({"PROPERTIES"})
+VIEWS = PANELS | {"VIEW_3D"}
+
+
+class Task(Protocol):
+    """Work in a daemon thread, such as `run.Run`. Nothing of it touches Blender's data."""
+
+    @property
+    def done(self) -> bool: ...
+    @property
+    def cancelled(self) -> bool: ...
+    @property
+    def progress(self) -> float: ...
+    @property
+    def status(self) -> str: ...
+    def cancel(self) -> None: ...
+    def wait(self, timeout: float | None = None) -> bool: ...
+    def raise_error(self) -> None: ...
+
+
+_current: Task | None = None
+
+
+def current() -> Task | None:
+    """The task under way, or None."""
+    return _current
+
+
+def expected_errors() -> tuple[type[Exception], ...]:
+    """The errors whose message tells the user what to do; any other is a bug, and keeps its traceback."""
+    try:
+        return (EspalierAddonError, native.module().EspalierError)
+    except EspalierAddonError:
+        return (EspalierAddonError,)
+
+
+class TaskOperator:
+    """Base of operators that start a task. In background mode, and when called to execute, they wait for it.
+
+    Subclasses have `begin`, which starts the task on the main thread; `advance`, which takes over what is finished,
+    called with every tick; and `finish`, called once, which answers what to report. None of them may rely on objects
+    of Blender kept from before: undo replaces them while the task runs.
+    """
+
+    options: bpy.types.OperatorProperties
+    report: Callable[[set[str], str], None]
+    begin: Callable[[bpy.types.Context], Task]
+    advance: Callable[[bpy.types.Context], None]
+    finish: Callable[[bpy.types.Context], str]
+
+    _task: Task
+    _timer: Any = None
+    bl_options: ClassVar[set[str]] = set()
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        if not self._start(context):
+            return {"CANCELLED"}
+        self._task.wait()
+        return self._end(context)
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        if bpy.app.background:
+            return self.execute(context)
+        if not self._start(context):
+            return {"CANCELLED"}
+        manager = context.window_manager
+        self._timer = manager.event_timer_add(TICK_SECONDS, window=context.window)
+        manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        if event.type == "ESC" and event.value == "PRESS":
+            self._task.cancel()
+            return {"RUNNING_MODAL"}
+        if event.type != "TIMER":
+            return {"PASS_THROUGH"}
+        if self._task.done:
+            return self._end(context)
+        self.advance(context)
+        context.workspace.status_text_set(f"{self._task.status}   {self._task.progress:.0%}   Esc: Cancel")
+        redraw(PANELS)
+        return {"PASS_THROUGH"}
+
+    def cancel(self, context: bpy.types.Context) -> None:
+        """Blender ends the operator: another file is loaded, or the window closes."""
+        self._task.cancel()
+        self._release(context)
+
+    def _start(self, context: bpy.types.Context) -> bool:
+        """Begin the task; False where an error was reported instead."""
+        global _current
+        window = context.window
+        if window is not None:
+            window.cursor_set("WAIT")
+        try:
+            self._task = _current = self.begin(context)
+        except expected_errors() as error:
+            self.report({"ERROR"}, str(error))
+            return False
+        finally:
+            if window is not None:
+                window.cursor_set("DEFAULT")
+        return True
+
+    def _end(self, context: bpy.types.Context) -> set[str]:
+        """Take over the results and report how it went. What was finished before a cancel or an error is kept."""
+        self._release(context)
+        self.advance(context)
+        redraw(VIEWS)
+        if self._task.cancelled:
+            self.report({"WARNING"}, "Cancelled")
+            return {"CANCELLED"}
+        try:
+            self._task.raise_error()
+            self.report({"INFO"}, self.finish(context))
+        except expected_errors() as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+    def _release(self, context: bpy.types.Context) -> None:
+        """Give back what the task held of the interface."""
+        global _current
+        _current = None
+        if self._timer is not None:
+            context.window_manager.event_timer_remove(self._timer)
+            context.workspace.status_text_set(None)
+            self._timer = None

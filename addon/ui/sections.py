@@ -1,0 +1,146 @@
+"""Parts of panels, drawn alike wherever they appear: run, settings, results, overlay."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import bpy
+
+from .. import overlay, results, session
+from .. import results_table as table
+from ..operators import task
+
+WIDE = 520
+"""Pixels, at a scale of 1, from which all columns of the results fit side by side."""
+
+BEST = "\N{BLACK STAR}"
+"""Marks the best of a column."""
+
+Layout = bpy.types.UILayout
+
+
+def draw_run(layout: Layout, context: bpy.types.Context) -> None:
+    """The buttons, the progress of what runs, and what the last export could not take over."""
+    column = layout.column()
+    column.scale_y = 1.25
+    column.operator("espalier.build_trace", icon="RENDER_STILL")
+    current = task.current()
+    if current is not None:
+        row = layout.row(align=True)
+        row.progress(factor=current.progress, text=current.status)
+        row.operator("espalier.cancel", text="", icon="X")
+    draw_warnings(layout, session.of(context.scene))
+
+
+def draw_warnings(layout: Layout, current: session.Session | None) -> None:
+    """What the export left out or approximated, one line each."""
+    if current is None or not current.run.data.warnings:
+        return
+    box = layout.box().column(align=True)
+    for index, warning in enumerate(current.run.data.warnings):
+        box.label(text=warning, icon="ERROR" if index == 0 else "BLANK1")
+
+
+def draw_methods(layout: Layout, settings: Any) -> None:
+    """Which methods the buttons run."""
+    layout.column(heading="Methods").prop(settings, "methods")
+
+
+def draw_settings(layout: Layout, settings: Any) -> None:
+    """How the frame is traced, and what the accelerator is built for."""
+    layout.prop(settings, "samples")
+    layout.prop(settings, "threads")
+    layout.prop(settings, "expected_rays")
+
+
+def draw_advanced(layout: Layout, settings: Any) -> None:
+    """What is seldom changed."""
+    layout.prop(settings, "max_bounces")
+    layout.prop(settings, "seed")
+
+
+def draw_results(layout: Layout, context: bpy.types.Context) -> None:
+    """The table: all columns side by side in a wide panel, times above sizes in a narrow one."""
+    rows = results.of(context.scene.session_uid)
+    if not rows:
+        layout.label(text="Nothing traced yet")
+        return
+    width = context.region.width / context.preferences.system.ui_scale
+    if width >= WIDE:
+        _draw_table(layout, rows, table.TIMES + table.SIZES, short=False)
+    else:
+        _draw_table(layout, rows, table.TIMES, short=True)
+        _draw_table(layout, rows, table.SIZES, short=True)
+    layout.operator("espalier.clear_results", icon="TRASH")
+
+
+def _draw_table(layout: Layout, rows: Sequence[results.Row], columns: Sequence[table.Column], *, short: bool) -> None:
+    row = layout.box().row()
+    names = row.column(align=True)
+    names.label(text="")
+    for entry in rows:
+        names.label(text=table.method_text(entry.method, short=short))
+    for column in columns:
+        _draw_column(row.column(align=True), rows, column)
+
+
+def _draw_column(layout: Layout, rows: Sequence[results.Row], column: table.Column) -> None:
+    layout.alignment = "RIGHT"
+    layout.label(text=column.title)
+    for cell in table.cells(rows, column):
+        layout.label(text=f"{BEST} {cell.text}" if cell.best else cell.text)
+
+
+def draw_overlay(layout: Layout, context: bpy.types.Context) -> None:
+    """What the overlay draws, in a panel with property split."""
+    settings = context.scene.espalier.overlay
+    layout.active = settings.show
+    layout.prop(settings, "method")
+    column = layout.column(heading="Boxes", align=True)
+    for names in overlay.TOGGLES.values():
+        _draw_kind(column.row(), settings, *names)
+    layout.prop(settings, "occupied_only")
+    layout.prop(settings, "in_front")
+    column = layout.column(align=True)
+    column.prop(settings, "depth_min", text="Depth Min")
+    column.prop(settings, "depth_max", text="Max")
+    layout.prop(settings, "opacity")
+    layout.prop(settings, "max_boxes")
+    layout.label(text=overlay_text(context.scene), icon="INFO")
+
+
+def draw_overlay_popover(layout: Layout, context: bpy.types.Context) -> None:
+    """The same where height is short: two settings side by side."""
+    settings = context.scene.espalier.overlay
+    row = layout.row()
+    row.prop(settings, "show")
+    row.prop(settings, "method", text="")
+    column = layout.column()
+    column.active = settings.show
+    grid = column.grid_flow(row_major=True, columns=2, even_columns=True)
+    for names in overlay.TOGGLES.values():
+        _draw_kind(grid.row(), settings, *names)
+    grid.prop(settings, "occupied_only")
+    grid.prop(settings, "in_front")
+    row = column.row(align=True)
+    row.prop(settings, "depth_min")
+    row.prop(settings, "depth_max", text="Max")
+    column.prop(settings, "opacity")
+    column.label(text=overlay_text(context.scene), icon="INFO")
+
+
+def _draw_kind(row: Layout, settings: Any, toggle: str, color: str) -> None:
+    """The switch of a kind of box beside its colour."""
+    row.prop(settings, toggle)
+    swatch = row.row()
+    swatch.ui_units_x = 2
+    swatch.prop(settings, color, text="")
+
+
+def overlay_text(scene: bpy.types.Scene) -> str:
+    """What is drawn now, in one line."""
+    drawing = overlay.drawing(scene)
+    if drawing is None:
+        return "Nothing built with this method"
+    if drawing.shown < drawing.matched:
+        return f"{drawing.shown:,} of {drawing.matched:,} boxes"
+    return f"{drawing.shown:,} boxes"
