@@ -33,7 +33,7 @@ class ESPALIER_RenderEngine(bpy.types.RenderEngine):
         if scene.espalier.cost_pass:
             self.register_pass(scene, renderlayer, "Cost", 1, "X", "VALUE")
 
-    def render(self, depsgraph: Any) -> None:  # type: ignore[override] # the stubs have render() return settings
+    def render(self, depsgraph: Any) -> None:
         """Render one view layer. An error ends the render with its message: Blender would not stop for an exception."""
         try:
             if not capture.taken(depsgraph):

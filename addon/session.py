@@ -79,7 +79,7 @@ def clear() -> None:
         session.run.wait(CANCEL_SECONDS)
 
 
-@bpy.app.handlers.persistent  # type: ignore[untyped-decorator] # the stubs leave it untyped
+@bpy.app.handlers.persistent
 def _on_load(*_arguments: object) -> None:
     clear()
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..scene_data import Color, LightData
 from .images import Images
-from .nodes import Node, Path, Socket, as_color, as_float, constant, follow, output_node
+from .nodes import Node, Path, Socket, as_color, as_float, constant, follow, node_tree, output_node
 from .notes import Notes
 
 Light: TypeAlias = Any
@@ -59,7 +59,8 @@ def _tint(light: Light, notes: Notes) -> tuple[Color, float]:
     color: Color = tuple(light.color)
     if getattr(light, "use_temperature", False):
         color = _times(color, light.temperature_color)
-    output = output_node(light.node_tree, "OUTPUT_LIGHT") if light.use_nodes and light.node_tree else None
+    tree = node_tree(light)
+    output = None if tree is None else output_node(tree, "OUTPUT_LIGHT")
     if output is None:
         return color, 1.0
     end = follow(output.inputs["Surface"])
@@ -82,9 +83,10 @@ def read_world(world: bpy.types.World | None, images: Images, notes: Notes) -> C
     """Radiance of the background: colour times strength. No world is black; a varying one is approximated, noted."""
     if world is None:
         return (0.0, 0.0, 0.0)
-    if world.node_tree is None or not world.use_nodes:
+    tree = node_tree(world)
+    if tree is None:
         return as_color(world.color)
-    output = output_node(world.node_tree, "OUTPUT_WORLD")
+    output = output_node(tree, "OUTPUT_WORLD")
     end = follow(output.inputs["Surface"]) if output is not None else None
     if end is None or end.node is None:
         return (0.0, 0.0, 0.0)

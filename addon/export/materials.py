@@ -13,12 +13,13 @@ and noted once a material:
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import bpy
 
 from ..scene_data import Color, MaterialData
 from .images import Images
-from .nodes import End, Node, Path, Socket, as_color, as_float, constant, follow
+from .nodes import End, Node, Path, Socket, as_color, as_float, constant, follow, node_tree
 from .notes import Notes
 
 PINK: Color = (1.0, 0.0, 1.0)
@@ -65,8 +66,8 @@ class _Reader:
 
     def read(self) -> MaterialData:
         """The material's surface."""
-        tree = self._material.node_tree
-        if tree is None or not self._material.use_nodes:
+        tree: Any = node_tree(self._material)
+        if tree is None:
             return self._plain
         output = tree.get_output_node("ALL") or tree.get_output_node("CYCLES")
         if output is None:

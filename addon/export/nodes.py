@@ -21,6 +21,12 @@ class End(NamedTuple):
     path: Path
 
 
+def node_tree(owner: Any) -> bpy.types.NodeTree | None:
+    """The node tree that a material, world or light uses, or None. From 5.0 on a tree that is there is used."""
+    used = bpy.app.version >= (5, 0) or owner.use_nodes
+    return owner.node_tree if used else None
+
+
 def output_node(tree: bpy.types.NodeTree, kind: str) -> Node | None:
     """The active node of a type such as 'OUTPUT_WORLD', or the first one, or None."""
     nodes = [node for node in tree.nodes if node.type == kind and not node.mute]

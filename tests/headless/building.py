@@ -44,10 +44,16 @@ def square(name: str = "Square", **settings: object) -> bpy.types.Object:
     return new
 
 
+def use_nodes(owner: object) -> None:
+    """Let a material, world or light have a node tree; from 5.0 on it always has one."""
+    if bpy.app.version < (5, 0) or owner.node_tree is None:
+        owner.use_nodes = True
+
+
 def material(name: str, shader: str = "ShaderNodeBsdfPrincipled", **inputs: object) -> bpy.types.Material:
     """A material of one shader with values for its inputs, whose spaces are written as underscores."""
     new = bpy.data.materials.new(name)
-    new.use_nodes = True
+    use_nodes(new)
     tree = new.node_tree
     tree.nodes.clear()
     node, output = tree.nodes.new(shader), tree.nodes.new("ShaderNodeOutputMaterial")

@@ -66,7 +66,8 @@ def test_exposure_normalize_and_temperature():
 
 def test_an_emission_node_tints_a_light_and_other_nodes_warn():
     data = bpy.data.lights.new("Light", "POINT")
-    data.energy, data.use_nodes = 10.0, True
+    data.energy = 10.0
+    building.use_nodes(data)
     emission = next(node for node in data.node_tree.nodes if node.type == "EMISSION")
     emission.inputs["Color"].default_value = (0.5, 1, 1, 1)
     emission.inputs["Strength"].default_value = 3.0
@@ -94,7 +95,7 @@ def test_hidden_lights_are_left_out_and_instanced_ones_are_not(scene):
 def world() -> bpy.types.World:
     """A new world with a Background node, set on the scene."""
     new = bpy.data.worlds.new("World")
-    new.use_nodes = True
+    building.use_nodes(new)
     bpy.context.scene.world = new
     if not new.node_tree.nodes:
         background, output = (new.node_tree.nodes.new(f"ShaderNode{name}") for name in ("Background", "OutputWorld"))

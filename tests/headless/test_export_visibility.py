@@ -178,7 +178,7 @@ def test_the_users_render_result_survives(scene, tmp_path):
     named("Shown")
     building.camera()
     scene.render.engine, scene.render.resolution_x, scene.render.resolution_y = "CYCLES", 16, 16
-    scene.cycles.samples = 1
+    scene.cycles.samples, scene.cycles.use_denoising = 1, False
     bpy.ops.render.render()
     images = []
     for name in ("before.png", "after.png"):
