@@ -10,6 +10,7 @@ pub mod job;
 pub mod mesh;
 pub mod pool;
 pub mod ray;
+pub mod render;
 pub mod simd;
 pub mod traverse;
 pub mod triangle;

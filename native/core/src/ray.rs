@@ -58,7 +58,7 @@ pub struct Rays<'a> {
 }
 
 /// One ray, gathered from its batch.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ray {
     /// Where it starts.
     pub origin: Vec3,
