@@ -4,12 +4,31 @@ Arrays are numpy's. Each docstring of the module gives shapes, types, units and 
 """
 
 from collections.abc import Mapping
-from typing import Any, Final, Literal, TypeAlias, final
+from typing import Any, Final, Literal, TypedDict, final, type_check_only
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Method: TypeAlias = Literal["bvh-median", "bvh-sah", "grid", "hybrid-sampled", "hybrid-cost"]
+__all__ = [
+    "MISS",
+    "Accelerator",
+    "Cancelled",
+    "Cells",
+    "ConfigError",
+    "EspalierError",
+    "Hits",
+    "InternalError",
+    "Job",
+    "Mesh",
+    "MeshError",
+    "OutOfMemory",
+    "RayError",
+    "SceneError",
+    "__version__",
+    "default_config",
+    "instruction_set",
+    "methods",
+]
 
 __version__: str
 MISS: Final[int]
@@ -108,3 +127,41 @@ class Accelerator:
         threads: int = 0,
         job: Job | None = None,
     ) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]: ...
+    def census(self) -> Census: ...
+    def cells(
+        self, *, max_depth: int | None = None, occupied_only: bool = False, max_count: int | None = None
+    ) -> Cells: ...
+    def decisions(self) -> dict[str, NDArray[Any]]: ...
+
+@final
+class Cells:
+    @property
+    def lower(self) -> NDArray[np.float32]: ...
+    @property
+    def upper(self) -> NDArray[np.float32]: ...
+    @property
+    def kind(self) -> NDArray[np.uint8]: ...
+    @property
+    def depth(self) -> NDArray[np.uint16]: ...
+    @property
+    def count(self) -> NDArray[np.uint32]: ...
+    @property
+    def truncated(self) -> bool: ...
+    def __len__(self) -> int: ...
+
+@type_check_only
+class Census(TypedDict):
+    method: str
+    triangles: int
+    nodes: int
+    leaves: int
+    grids: int
+    cells: int
+    empty_cells: int
+    references: int
+    bytes: int
+    max_depth: int
+    depth_histogram: list[int]
+    sah_cost: float
+    phases: dict[str, float]
+    build_ms: float

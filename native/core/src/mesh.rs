@@ -1,7 +1,6 @@
 //! Triangle meshes, validated once.
 
 use glam::{DVec3, Vec3};
-use rayon::prelude::*;
 
 use crate::{Error, bounds::Bounds, error};
 
@@ -30,8 +29,7 @@ impl Mesh {
         check_triangles(&triangles, vertices.len())?;
         let mut solid = error::reserve(triangles.len(), "the list of triangles")?;
         solid.extend((0..triangles.len() as u32).filter(|&t| !is_degenerate(&vertices, triangles[t as usize])));
-        let bounds = solid.par_chunks(1 << 16).map(|part| bounds_of(&vertices, &triangles, part));
-        let bounds = bounds.reduce(|| Bounds::EMPTY, |a, b| a.union(&b));
+        let bounds = Bounds::of_points(solid.iter().flat_map(|&t| corners(&vertices, triangles[t as usize])));
         Ok(Self { vertices, triangles, solid, bounds })
     }
 
@@ -86,10 +84,6 @@ fn corners(vertices: &[Vec3], triangle: [u32; 3]) -> [Vec3; 3] {
 fn is_degenerate(vertices: &[Vec3], triangle: [u32; 3]) -> bool {
     let [a, b, c] = corners(vertices, triangle).map(|corner| corner.as_dvec3());
     (b - a).cross(c - a) == DVec3::ZERO
-}
-
-fn bounds_of(vertices: &[Vec3], triangles: &[[u32; 3]], part: &[u32]) -> Bounds {
-    Bounds::of_points(part.iter().flat_map(|&t| corners(vertices, triangles[t as usize])))
 }
 
 fn check_vertices(vertices: &[Vec3]) -> Result<(), Error> {

@@ -1,13 +1,14 @@
 //! `Accelerator`.
 
-use std::sync::Arc;
+use std::{sync::Arc, time::Instant};
 
-use espalier_core::{self as core, Error, Method, traverse::probe::Counts};
-use pyo3::prelude::*;
+use espalier_core::{self as core, Error, Method, accel::cells::CellFilter, traverse::probe::Counts};
+use pyo3::{prelude::*, types::PyDict};
 
 use crate::{
     arrays::{self, List},
-    config,
+    cells::Cells,
+    census, config, decisions,
     errors::{OrRaise, guard},
     hits::{Hits, Room},
     job::Job,
@@ -35,6 +36,7 @@ use crate::{
 pub struct Accelerator {
     accelerator: Arc<core::Accelerator>,
     mesh: Py<Mesh>,
+    build_ms: f64,
 }
 
 #[pymethods]
@@ -62,8 +64,10 @@ impl Accelerator {
             let config = config::from_mapping(py, method, config)?;
             let (threads, job) = (config::threads(py, threads)?, Job::shared(job));
             let core_mesh = Arc::clone(mesh.get().core());
+            let start = Instant::now();
             let accelerator = py.detach(|| core::Accelerator::build(core_mesh, method, &config, threads, &job));
-            Ok(Self { accelerator: Arc::new(accelerator.or_raise(py)?), mesh: mesh.clone().unbind() })
+            let build_ms = start.elapsed().as_secs_f64() * 1e3;
+            Ok(Self { accelerator: Arc::new(accelerator.or_raise(py)?), mesh: mesh.clone().unbind(), build_ms })
         })
     }
 
@@ -152,6 +156,54 @@ impl Accelerator {
             py.detach(work).or_raise(py)?;
             Ok((arrays::returned(steps), arrays::returned(tests)))
         })
+    }
+
+    /// What the structure consists of and what its build took, in numbers, by name:
+    ///
+    /// method; triangles of the mesh; nodes (wide branches), leaves, grids; cells of all grids and empty_cells among
+    /// them; references (triangles in leaves and cells, each as often as it occurs); bytes held without the mesh;
+    /// max_depth and depth_histogram (branches, leaves and grids at every depth, the root's first); sah_cost (what a line
+    /// through the scene's box costs, in visits of a wide node); phases (milliseconds of wall time by name) and build_ms
+    /// (of the whole build).
+    fn census<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        guard(py, || census::to_dict(py, &self.accelerator, self.build_ms))
+    }
+
+    /// The boxes of the structure, for drawing: see Cells.
+    ///
+    /// max_depth: no box below this depth, where the root has 0; None for all.
+    /// occupied_only: no grid cell without a triangle.
+    /// max_count: no more boxes than this; those nearest to the root are kept, and Cells.truncated tells. None for all.
+    ///
+    /// Raises ConfigError for a number below 0, and OutOfMemory.
+    #[pyo3(signature = (*, max_depth=None, occupied_only=false, max_count=None))]
+    fn cells(
+        &self,
+        py: Python<'_>,
+        max_depth: Option<i64>,
+        occupied_only: bool,
+        max_count: Option<i64>,
+    ) -> PyResult<Cells> {
+        guard(py, || {
+            let whole = |name, value: Option<i64>| value.map(|v| config::whole(py, name, v, i64::MAX)).transpose();
+            let filter = CellFilter {
+                max_depth: whole("max_depth", max_depth)?,
+                occupied_only,
+                max_count: whole("max_count", max_count)?,
+            };
+            Cells::new(py, &py.detach(|| self.accelerator.cells(&filter)).or_raise(py)?)
+        })
+    }
+
+    /// The evidence of a hybrid's decisions, one row a node it decided on, from the root down; no rows for other
+    /// methods. Read-only arrays by name:
+    ///
+    /// lower, upper (k, 3) float32: tight box. depth (k,) uint32: the root has 0. primitives (k,) uint32: triangles.
+    /// rays, hits (k,) uint32: sample rays traced and how many hit. spread (k,) float32: index of dispersion of the hits
+    /// over the strata. hit_threshold, spread_threshold (k,) float32: what they were compared with. cost_grid, cost_bvh
+    /// (k,) float32: expected nanoseconds. verdict (k,) uint8: 0 split on, 1 grid, 2 leaf. Numbers without use are nan.
+    fn decisions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        guard(py, || decisions::to_dict(py, self.accelerator.decisions()))
     }
 
     fn __repr__(&self) -> String {

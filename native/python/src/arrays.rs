@@ -167,6 +167,22 @@ pub type List<T> = Py<PyArray<T, Ix1>>;
 /// An array of shape (n, columns), on its way out.
 pub type Table<T> = Py<PyArray<T, Ix2>>;
 
+/// A new read-only array of shape (n,).
+pub fn list<T: Element>(py: Python<'_>, values: impl ExactSizeIterator<Item = T> + Send) -> PyResult<List<T>> {
+    let mut array = empty(py, values.len())?;
+    let slots = array.as_slice_mut()?;
+    py.detach(|| slots.iter_mut().zip(values).for_each(|(slot, value)| *slot = value));
+    Ok(finished(array))
+}
+
+/// A new read-only array of shape (n, 3).
+pub fn table<T: Element>(py: Python<'_>, rows: impl ExactSizeIterator<Item = [T; 3]> + Send) -> PyResult<Table<T>> {
+    let mut array = empty_table(py, rows.len(), 3)?;
+    let (slots, _) = array.as_slice_mut()?.as_chunks_mut::<3>();
+    py.detach(|| slots.iter_mut().zip(rows).for_each(|(slot, row)| *slot = row));
+    Ok(finished(array))
+}
+
 /// A new numpy array of shape (n,), contents unspecified.
 pub fn empty<T: Element>(py: Python<'_>, count: usize) -> PyResult<PyReadwriteArray<'_, T, Ix1>> {
     let array = numpy_function(py, "empty")?.call1((count, numpy::dtype::<T>(py)))?;

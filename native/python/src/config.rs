@@ -138,6 +138,14 @@ const MOST_THREADS: i64 = 1024;
 /// # Errors
 /// ConfigError.
 pub fn threads(py: Python<'_>, threads: i64) -> PyResult<usize> {
-    let fault = || Kind::Config.error(py, format!("threads is {threads}; it must be from 0 (all) to {MOST_THREADS}"));
-    if threads > MOST_THREADS { Err(fault()) } else { threads.try_into().map_err(|_| fault()) }
+    whole(py, "threads", threads, MOST_THREADS)
+}
+
+/// A whole number from 0 to `most`.
+///
+/// # Errors
+/// ConfigError.
+pub fn whole(py: Python<'_>, name: &str, value: i64, most: i64) -> PyResult<usize> {
+    let fault = || Kind::Config.error(py, format!("{name} is {value}; it must be from 0 to {most}"));
+    if value > most { Err(fault()) } else { value.try_into().map_err(|_| fault()) }
 }

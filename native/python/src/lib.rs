@@ -4,7 +4,10 @@
 
 mod accelerator;
 mod arrays;
+mod cells;
+mod census;
 mod config;
+mod decisions;
 mod errors;
 mod functions;
 mod hits;
@@ -21,6 +24,7 @@ mod espalier_rt {
     #[pymodule_export]
     use crate::{
         accelerator::Accelerator,
+        cells::Cells,
         functions::{default_config, instruction_set, methods},
         hits::Hits,
         job::Job,

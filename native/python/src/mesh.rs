@@ -70,10 +70,7 @@ impl Mesh {
     fn bounds(&self, py: Python<'_>) -> PyResult<Table<f32>> {
         guard(py, || {
             let bounds = self.0.bounds();
-            let mut array = arrays::empty_table(py, 2, 3)?;
-            let corners = [bounds.lower.to_array(), bounds.upper.to_array()];
-            array.as_slice_mut()?.copy_from_slice(corners.as_flattened());
-            Ok(arrays::finished(array))
+            arrays::table(py, [bounds.lower.to_array(), bounds.upper.to_array()].into_iter())
         })
     }
 
