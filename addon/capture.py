@@ -6,10 +6,11 @@ its settings, and its Render Result stay as they are. The copy shares objects an
 """
 
 import contextlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import bpy
+from mathutils import Matrix
 
 from .errors import CaptureError, NoCameraError
 from .export import export_scene
@@ -36,9 +37,10 @@ def export_frame(
     if scene.camera is None:
         raise NoCameraError(scene.name)
     layer = view_layer or next((layer for layer in scene.view_layers if layer.use), scene.view_layers[0])
+    moved = _moved_by_physics(scene, layer)
     with _copy(scene) as copy:
         _prepare(copy, layer.name, resolution, border)
-        return _export(copy, scene.name)
+        return _export(copy, scene.name, moved)
 
 
 def taken(depsgraph: bpy.types.Depsgraph) -> bool:
@@ -49,7 +51,7 @@ def taken(depsgraph: bpy.types.Depsgraph) -> bool:
     return True
 
 
-def _export(scene: bpy.types.Scene, name: str) -> SceneData:
+def _export(scene: bpy.types.Scene, name: str, moved: Mapping[int, Matrix]) -> SceneData:
     global _take
     outcome: list[SceneData | Exception] = []
 
@@ -57,7 +59,7 @@ def _export(scene: bpy.types.Scene, name: str) -> SceneData:
         if outcome:  # the second eye of a stereoscopic scene
             return
         try:
-            outcome.append(export_scene(depsgraph, name))
+            outcome.append(export_scene(depsgraph, name, moved))
         except Exception as error:  # noqa: BLE001 - raised again by the caller, outside of the render
             outcome.append(error)
 
@@ -74,6 +76,29 @@ def _export(scene: bpy.types.Scene, name: str) -> SceneData:
     if isinstance(outcome[0], Exception):
         raise outcome[0]
     return outcome[0]
+
+
+def _moved_by_physics(scene: bpy.types.Scene, layer: bpy.types.ViewLayer) -> dict[int, Matrix]:
+    """World matrices, by pointer, of rigid bodies and their children: a copied scene has no simulation of its own."""
+    world = scene.rigidbody_world
+    if world is None or not world.enabled:
+        return {}
+    depsgraph: Any = layer.depsgraph
+    depsgraph.update()
+    return {
+        thing.as_pointer(): thing.evaluated_get(depsgraph).matrix_world.copy()
+        for thing in layer.objects
+        if _is_rigid(thing)
+    }
+
+
+def _is_rigid(thing: bpy.types.Object | None) -> bool:
+    """Whether an object or one of its parents is a rigid body."""
+    while thing is not None:
+        if thing.rigid_body is not None:
+            return True
+        thing = thing.parent
+    return False
 
 
 def _prepare(scene: bpy.types.Scene, view_layer: str, resolution: tuple[int, int] | None, border: bool) -> None:

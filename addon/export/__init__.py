@@ -5,10 +5,12 @@ modifiers; `capture` gets one outside of a render. Nothing in the file is change
 """
 
 import time
+from collections.abc import Mapping
 from typing import Any
 
 import bpy
 import numpy as np
+from mathutils import Matrix
 
 from ..errors import NoGeometryError, NonFiniteGeometryError
 from ..scene_data import GeometryData, SceneData
@@ -21,8 +23,12 @@ from .notes import Notes
 from .objects import Objects, note_collections
 
 
-def export_scene(depsgraph: bpy.types.Depsgraph, name: str | None = None) -> SceneData:
-    """One frame of one view layer of an evaluated render depsgraph. `name` stands for the scene's own.
+def export_scene(
+    depsgraph: bpy.types.Depsgraph, name: str | None = None, moved: Mapping[int, Matrix] | None = None
+) -> SceneData:
+    """One frame of one view layer of an evaluated render depsgraph.
+
+    `name` stands for the scene's own, and `moved` has world matrices that stand for objects' own, by their pointers.
 
     Raises NoCameraError, UnsupportedCameraError, NoGeometryError, NonFiniteGeometryError, and ValueError for a
     viewport's depsgraph, whose geometry may differ from the render's: use `capture.export_frame` there.
@@ -38,7 +44,7 @@ def export_scene(depsgraph: bpy.types.Depsgraph, name: str | None = None) -> Sce
     name = name or scene.name
     camera = read_camera(scene, name, notes)
     note_collections(view_layer, notes)
-    objects = Objects(depsgraph, materials, notes)
+    objects = Objects(depsgraph, materials, notes, moved or {})
     placements = objects.placements
     if not placements:
         raise NoGeometryError(name, view_layer.name)

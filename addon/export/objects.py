@@ -1,8 +1,10 @@
 """Walks what renders in a view layer, and gathers meshes with their instances, and lights."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import bpy
+from mathutils import Matrix
 
 from ..scene_data import LightData
 from .flatten import Placement
@@ -23,10 +25,14 @@ UNSUPPORTED = {
 class Objects:
     """Meshes, each read once with all its instances, and lights of a render depsgraph."""
 
-    def __init__(self, depsgraph: bpy.types.Depsgraph, materials: Materials, notes: Notes) -> None:
+    def __init__(
+        self, depsgraph: bpy.types.Depsgraph, materials: Materials, notes: Notes, moved: Mapping[int, Matrix]
+    ) -> None:
         self.lights: list[LightData] = []
         self._materials = materials
         self._notes = notes
+        self._moved = moved
+        self._override: Any = depsgraph.view_layer.material_override
         self._placements: dict[int, Placement | None] = {}
         self._slots: dict[tuple[int, int], tuple[int, ...]] = {}
         for instance in depsgraph.object_instances:
@@ -44,7 +50,7 @@ class Objects:
         if thing.type == "MESH":
             self._mesh(thing, instance)
         elif thing.type == "LIGHT":
-            self.lights.append(read_light(thing.data, instance.matrix_world, thing.name, self._notes))
+            self.lights.append(read_light(thing.data, self._matrix(instance), thing.name, self._notes))
         elif thing.type in UNSUPPORTED:
             self._notes.add(f"Object '{thing.name}' is {UNSUPPORTED[thing.type]} and is left out")
 
@@ -56,14 +62,21 @@ class Objects:
             self._placements[key] = None if local is None else Placement(local)
         placement = self._placements[key]
         if placement is not None:
-            placement.add(instance.matrix_world.copy(), self._slots_of(thing, key))
+            placement.add(self._matrix(instance), self._slots_of(thing, key))
+
+    def _matrix(self, instance: Any) -> Matrix:
+        """Local to world; the iterator reuses its own matrix, so this is a copy."""
+        if not self._moved or (instance.is_instance and instance.parent != instance.object):
+            return instance.matrix_world.copy()
+        return self._moved.get(instance.object.original.as_pointer(), instance.matrix_world).copy()
 
     def _slots_of(self, thing: Any, mesh: int) -> tuple[int, ...]:
         """Material of every slot; kept by original object and mesh, as instances have passing objects."""
         key = (thing.original.as_pointer(), mesh)
         if key not in self._slots:
             self._note_ignored(thing)
-            self._slots[key] = tuple(self._materials.index(slot.material) for slot in thing.material_slots) or (0,)
+            materials = [self._override or slot.material for slot in thing.material_slots] or [self._override]
+            self._slots[key] = tuple(self._materials.index(material) for material in materials)
         return self._slots[key]
 
     def _note_ignored(self, thing: Any) -> None:

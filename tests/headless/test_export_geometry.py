@@ -296,3 +296,27 @@ def test_a_parents_shear_is_in_the_matrix():
     wanted = sorted(tuple(round(x, 4) for x in expected @ Matrix.Translation(v).translation) for v in building.SQUARE)
     found = sorted(tuple(round(float(x), 4) for x in vertex) for vertex in data.geometry.vertices)
     np.testing.assert_allclose(found, wanted, atol=1e-3)
+
+
+def test_a_simulated_rigid_body_is_where_the_simulation_put_it(scene):
+    falling = building.square("Falling", location=(0, 0, 100))
+    child = building.square("Child", location=(5, 0, 0))
+    child.parent = falling
+    still = building.square("Still")
+    bpy.context.view_layer.objects.active = falling
+    falling.select_set(True)
+    bpy.ops.rigidbody.object_add()
+    for frame in range(1, 21):
+        scene.frame_set(frame)
+    fallen = falling.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world.translation.z
+    assert fallen < 99.0
+    heights = sorted(building.corners(building.export())[:, :, 2].mean(axis=1))
+    np.testing.assert_allclose(heights, [still.location.z] * 2 + [fallen] * 4, atol=1e-3)
+
+
+def test_a_view_layers_material_override_covers_everything(scene):
+    building.square("Bare")
+    building.square("Red").data.materials.append(building.material("Red"))
+    scene.view_layers[0].material_override = building.material("Clay")
+    data = building.export()
+    assert {data.materials[index].name for index in data.geometry.material_index} == {"Clay"}
