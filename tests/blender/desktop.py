@@ -17,6 +17,10 @@ from numpy.typing import NDArray
 from .blender import SCRIPTS, Blender
 
 SIZE = (1600, 1000)
+REST = (SIZE[0] - 480, 12)
+"""Where no button is: the empty part of the top bar."""
+REDRAW_SECONDS = 0.5
+"""What software OpenGL takes to draw the whole window, with room to spare."""
 
 
 def wait_until(condition: Callable[[], Any], seconds: float, what: str, interval: float = 0.1) -> Any:
@@ -105,10 +109,12 @@ class Desktop:
         self._xdotool("mousemove", x, y)
 
     def click(self, x: int, y: int) -> None:
-        """Press and release the left button at a pixel."""
+        """Press and release the left button at a pixel, and take the mouse away, so that no tooltip hides a thing."""
         self.move(x, y)
         time.sleep(0.3)  # Blender makes the button under the mouse active on its next redraw
         self._xdotool("click", 1)
+        time.sleep(0.1)
+        self.move(*REST)
 
     def key(self, name: str) -> None:
         """Press and release a key, by its X name."""
@@ -116,6 +122,8 @@ class Desktop:
 
     def screenshot(self, name: str) -> NDArray[np.uint8]:
         """The whole screen as (height, width, 3), also kept as NAME.png in the folder."""
+        self.python("for area in window.screen.areas:\n    area.tag_redraw()")
+        time.sleep(REDRAW_SECONDS)
         path = self.folder / f"{name}.png"
         subprocess.run(["import", "-window", "root", path], env=self.environment, check=True)
         raw = subprocess.run(["convert", path, "-depth", "8", "rgb:-"], capture_output=True, check=True).stdout

@@ -52,7 +52,7 @@ def desktop(blender: Blender, blend: Path) -> Iterator[Desktop]:
     folder = ROOT / "out" / "gui" / os.environ.get("ESPALIER_GUI", "")
     with Desktop(blender, blend, folder) as opened:
         opened.python(LAYOUT)
-        time.sleep(1.0)
+        opened.screenshot("start")
         yield opened
 
 
@@ -82,7 +82,6 @@ def changed(before: NDArray[np.uint8], after: NDArray[np.uint8], area: tuple[int
 def show_cells(desktop: Desktop, shown: bool) -> NDArray[np.uint8]:
     """Switch the overlay; the screen once it is redrawn."""
     desktop.python(f"window.scene.espalier.overlay.show = {shown}")
-    time.sleep(1.0)
     return desktop.screenshot(f"overlay-{'on' if shown else 'off'}")
 
 
@@ -164,7 +163,6 @@ def seconds_to_end_on_escape(desktop: Desktop) -> float:
 
 def test_disabled_it_leaves_the_interface_clean(desktop: Desktop) -> None:
     desktop.python(f"bpy.ops.preferences.addon_disable(module='{MODULE}')")
-    time.sleep(1.0)
     desktop.screenshot("disabled")
     assert desktop.python("value = hasattr(window.scene, 'espalier')") is False
     assert "Traceback" not in desktop.output()
