@@ -72,7 +72,7 @@ pub fn intersect(frame: &Frame, corners: [[f32; 3]; 3], primitive: u32) -> Optio
     if determinant == 0.0 {
         return None;
     }
-    let depth = f64::from(frame.direction[frame.axes[2]]);
+    let depth = f64::from(frame.direction[frame.axes[2] as usize]);
     let t = ((u * a[2] + v * b[2] + w * c[2]) / (determinant * depth)) as f32;
     let hit = Hit { t, primitive, u: (v / determinant) as f32, v: (w / determinant) as f32 };
     (frame.tmin <= t && t <= frame.tmax).then_some(hit)
@@ -82,7 +82,7 @@ pub fn intersect(frame: &Frame, corners: [[f32; 3]; 3], primitive: u32) -> Optio
 /// rounds them, so that the filter and this test see the same point.
 #[inline]
 fn shear(frame: &Frame, corner: [f32; 3]) -> [f64; 3] {
-    let [kx, ky, kz] = frame.axes;
+    let [kx, ky, kz] = frame.axes.map(|axis| axis as usize);
     let p: [f32; 3] = std::array::from_fn(|k| corner[k] - frame.origin[k]);
     let x = p[kx] - frame.shear[0] * p[kz];
     let y = p[ky] - frame.shear[1] * p[kz];

@@ -80,6 +80,7 @@ impl Packer<'_> {
             node.child[lane] = packed.root;
             deepest = deepest.max(packed.stack_size);
         }
+        node.set_order();
         self.nodes[slot] = node;
         Ok(Packed { root: NodeRef::branch(slot), stack_size: children.len() - 1 + deepest })
     }

@@ -77,6 +77,9 @@ pub struct Node {
     pub plane: [[f32; LANES]; 6],
     /// The children; the used ones come first.
     pub child: [NodeRef; LANES],
+    /// For rays of each octant (see [`Frame::octant`](crate::traverse::frame::Frame::octant)) the eight lanes, three
+    /// bits each, the one to visit last in the lowest bits.
+    pub order: [u32; LANES],
 }
 
 impl Node {
@@ -91,7 +94,22 @@ impl Node {
             [f32::NEG_INFINITY; LANES],
         ],
         child: [NodeRef::EMPTY; LANES],
+        order: [0; LANES],
     };
+
+    /// Set the order of visits from the boxes: by where their centres lie along the octant's diagonal.
+    pub fn set_order(&mut self) {
+        for octant in 0..8 {
+            let along = |lane: usize| -> f32 {
+                let centre = |k: usize| self.plane[k][lane] + self.plane[3 + k][lane];
+                (0..3).map(|k| if octant >> k & 1 == 1 { -centre(k) } else { centre(k) }).sum()
+            };
+            let mut lanes: [usize; LANES] = std::array::from_fn(|lane| lane);
+            let depth: [f32; LANES] = std::array::from_fn(along);
+            lanes.sort_by(|&a, &b| depth[a].total_cmp(&depth[b]));
+            self.order[octant] = lanes.iter().fold(0, |order, &lane| order << 3 | lane as u32);
+        }
+    }
 
     /// How many children it has.
     pub fn len(&self) -> usize {

@@ -12,7 +12,7 @@ mod x86;
 
 pub use portable::Portable;
 #[cfg(target_arch = "x86_64")]
-pub use x86::Avx2;
+pub use x86::{Avx2, Avx512};
 
 /// Operations on eight lanes.
 ///
@@ -43,7 +43,14 @@ pub trait Simd: Copy + Send + Sync + 'static {
     fn le(self, a: Self::F32, b: Self::F32) -> u32;
     /// Bit `i` is set where lane `i` has a < 0 < b.
     fn straddles_zero(self, a: Self::F32, b: Self::F32) -> u32;
+    /// Copy the ids whose mask has bit `bit` to the front of `out`, in order, and count them.
+    ///
+    /// All slices have the same length, a multiple of [`GROUP`]; what stands in `out` behind the copies is unspecified.
+    fn compact(self, masks: &[u8], bit: u32, ids: &[u16], out: &mut [u16]) -> usize;
 }
+
+/// Lists of ids are handled in groups of this many.
+pub const GROUP: usize = 32;
 
 /// Work written once for every instruction set. Implementations must be `#[inline(always)]`, and so must all that they
 /// call in their inner loops: a closure, or a function that takes one, is compiled without the instruction set and
@@ -63,6 +70,9 @@ pub enum Level {
     /// 256-bit vectors with fused multiply-add.
     #[cfg(target_arch = "x86_64")]
     Avx2(Avx2),
+    /// The same with mask registers and compression.
+    #[cfg(target_arch = "x86_64")]
+    Avx512(Avx512),
 }
 
 impl Level {
@@ -76,16 +86,21 @@ impl Level {
         #[allow(unused_mut)]
         let mut levels = vec![Self::Portable(Portable)];
         #[cfg(target_arch = "x86_64")]
-        levels.extend(Avx2::detect().map(Self::Avx2));
+        {
+            levels.extend(Avx2::detect().map(Self::Avx2));
+            levels.extend(Avx512::detect().map(Self::Avx512));
+        }
         levels
     }
 
-    /// Its name: `portable` or `avx2`.
+    /// Its name: `portable`, `avx2` or `avx512`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Portable(_) => "portable",
             #[cfg(target_arch = "x86_64")]
             Self::Avx2(_) => "avx2",
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512(_) => "avx512",
         }
     }
 
@@ -96,6 +111,8 @@ impl Level {
             Self::Portable(simd) => simd.run(kernel),
             #[cfg(target_arch = "x86_64")]
             Self::Avx2(simd) => simd.run(kernel),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512(simd) => simd.run(kernel),
         }
     }
 }

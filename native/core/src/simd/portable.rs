@@ -63,4 +63,13 @@ impl Simd for Portable {
     fn straddles_zero(self, a: [f32; 8], b: [f32; 8]) -> u32 {
         bits(|i| (a[i] < 0.0) & (b[i] > 0.0))
     }
+    #[inline(always)]
+    fn compact(self, masks: &[u8], bit: u32, ids: &[u16], out: &mut [u16]) -> usize {
+        let mut count = 0;
+        for (mask, id) in masks.iter().zip(ids) {
+            out[count] = *id;
+            count += usize::from(mask >> bit & 1);
+        }
+        count
+    }
 }

@@ -1,8 +1,8 @@
-//! x86-64 with AVX2 and FMA.
+//! x86-64: AVX2 with FMA, and the AVX-512 subsets of Ice Lake and Zen 4.
 
 use std::arch::x86_64::*;
 
-use super::{Kernel, Simd};
+use super::{GROUP, Kernel, Simd};
 
 /// Proof that the processor has AVX2, FMA, BMI1, BMI2, LZCNT and POPCNT.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -21,9 +21,79 @@ impl Avx2 {
     }
 }
 
+/// Proof that the processor has all of [`Avx2`] and AVX-512 F, BW, DQ, VL and VBMI2.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Avx512(());
+
+impl Avx512 {
+    /// The proof, where the processor gives it.
+    pub fn detect() -> Option<Self> {
+        let has = Avx2::detect().is_some()
+            && is_x86_feature_detected!("avx512f")
+            && is_x86_feature_detected!("avx512bw")
+            && is_x86_feature_detected!("avx512dq")
+            && is_x86_feature_detected!("avx512vl")
+            && is_x86_feature_detected!("avx512vbmi2");
+        has.then_some(Self(()))
+    }
+}
+
 #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
-fn enter<K: Kernel>(token: Avx2, kernel: K) -> K::Output {
+fn enter_avx2<K: Kernel>(token: Avx2, kernel: K) -> K::Output {
     kernel.run(token)
+}
+
+#[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt,avx512f,avx512bw,avx512dq,avx512vl,avx512vbmi2")]
+fn enter_avx512<K: Kernel>(token: Avx512, kernel: K) -> K::Output {
+    kernel.run(token)
+}
+
+/// The operations on 256-bit vectors that both tokens share.
+macro_rules! arithmetic {
+    () => {
+        #[inline(always)]
+        fn splat(self, value: f32) -> __m256 {
+            // SAFETY: a token exists only where AVX was detected.
+            unsafe { _mm256_set1_ps(value) }
+        }
+        #[inline(always)]
+        fn load(self, values: &[f32; 8]) -> __m256 {
+            // SAFETY: as for `splat`; the reference is to 32 readable bytes and the load asks for no alignment.
+            unsafe { _mm256_loadu_ps(values.as_ptr()) }
+        }
+        #[inline(always)]
+        fn store(self, value: __m256) -> [f32; 8] {
+            let mut values = [0.0; 8];
+            // SAFETY: as for `splat`; the array is 32 writable bytes and the store asks for no alignment.
+            unsafe { _mm256_storeu_ps(values.as_mut_ptr(), value) };
+            values
+        }
+        #[inline(always)]
+        fn sub(self, a: __m256, b: __m256) -> __m256 {
+            // SAFETY: as for `splat`.
+            unsafe { _mm256_sub_ps(a, b) }
+        }
+        #[inline(always)]
+        fn mul(self, a: __m256, b: __m256) -> __m256 {
+            // SAFETY: as for `splat`.
+            unsafe { _mm256_mul_ps(a, b) }
+        }
+        #[inline(always)]
+        fn mul_add(self, a: __m256, b: __m256, c: __m256) -> __m256 {
+            // SAFETY: a token exists only where FMA was detected.
+            unsafe { _mm256_fmadd_ps(a, b, c) }
+        }
+        #[inline(always)]
+        fn min(self, a: __m256, b: __m256) -> __m256 {
+            // SAFETY: as for `splat`.
+            unsafe { _mm256_min_ps(a, b) }
+        }
+        #[inline(always)]
+        fn max(self, a: __m256, b: __m256) -> __m256 {
+            // SAFETY: as for `splat`.
+            unsafe { _mm256_max_ps(a, b) }
+        }
+    };
 }
 
 impl Simd for Avx2 {
@@ -31,51 +101,10 @@ impl Simd for Avx2 {
 
     #[inline]
     fn run<K: Kernel>(self, kernel: K) -> K::Output {
-        // SAFETY: a token exists only where every feature of `enter` was detected.
-        unsafe { enter(self, kernel) }
+        // SAFETY: a token exists only where every feature of `enter_avx2` was detected.
+        unsafe { enter_avx2(self, kernel) }
     }
-    #[inline(always)]
-    fn splat(self, value: f32) -> __m256 {
-        // SAFETY: a token exists only where AVX was detected.
-        unsafe { _mm256_set1_ps(value) }
-    }
-    #[inline(always)]
-    fn load(self, values: &[f32; 8]) -> __m256 {
-        // SAFETY: as for `splat`; the reference is to 32 readable bytes and the load asks for no alignment.
-        unsafe { _mm256_loadu_ps(values.as_ptr()) }
-    }
-    #[inline(always)]
-    fn store(self, value: __m256) -> [f32; 8] {
-        let mut values = [0.0; 8];
-        // SAFETY: as for `splat`; the array is 32 writable bytes and the store asks for no alignment.
-        unsafe { _mm256_storeu_ps(values.as_mut_ptr(), value) };
-        values
-    }
-    #[inline(always)]
-    fn sub(self, a: __m256, b: __m256) -> __m256 {
-        // SAFETY: as for `splat`.
-        unsafe { _mm256_sub_ps(a, b) }
-    }
-    #[inline(always)]
-    fn mul(self, a: __m256, b: __m256) -> __m256 {
-        // SAFETY: as for `splat`.
-        unsafe { _mm256_mul_ps(a, b) }
-    }
-    #[inline(always)]
-    fn mul_add(self, a: __m256, b: __m256, c: __m256) -> __m256 {
-        // SAFETY: a token exists only where FMA was detected.
-        unsafe { _mm256_fmadd_ps(a, b, c) }
-    }
-    #[inline(always)]
-    fn min(self, a: __m256, b: __m256) -> __m256 {
-        // SAFETY: as for `splat`.
-        unsafe { _mm256_min_ps(a, b) }
-    }
-    #[inline(always)]
-    fn max(self, a: __m256, b: __m256) -> __m256 {
-        // SAFETY: as for `splat`.
-        unsafe { _mm256_max_ps(a, b) }
-    }
+    arithmetic!();
     #[inline(always)]
     fn le(self, a: __m256, b: __m256) -> u32 {
         // SAFETY: as for `splat`.
@@ -90,5 +119,87 @@ impl Simd for Avx2 {
             let above = _mm256_cmp_ps::<_CMP_GT_OQ>(b, zero);
             _mm256_movemask_ps(_mm256_and_ps(below, above)) as u32
         }
+    }
+    #[inline(always)]
+    fn compact(self, masks: &[u8], bit: u32, ids: &[u16], out: &mut [u16]) -> usize {
+        let mut count = 0;
+        let shift = i64::from(7 - bit);
+        for (masks, ids) in masks.chunks_exact(8).zip(ids.chunks_exact(8)) {
+            let out = &mut out[count..count + 8];
+            // SAFETY: a token exists only where AVX2 was detected; all three slices have eight elements, the table's
+            // rows sixteen bytes, and no access asks for alignment.
+            unsafe {
+                let bits = _mm_sll_epi16(_mm_loadl_epi64(masks.as_ptr().cast()), _mm_cvtsi64_si128(shift));
+                let wanted = (_mm_movemask_epi8(bits) & 0xff) as usize;
+                let order = _mm_loadu_si128(SHUFFLES[wanted].as_ptr().cast());
+                let chosen = _mm_shuffle_epi8(_mm_loadu_si128(ids.as_ptr().cast()), order);
+                _mm_storeu_si128(out.as_mut_ptr().cast(), chosen);
+                count += wanted.count_ones() as usize;
+            }
+        }
+        count
+    }
+}
+
+/// For every set of eight, the byte shuffle that brings its 16-bit elements to the front.
+static SHUFFLES: [[u8; 16]; 256] = shuffles();
+
+const fn shuffles() -> [[u8; 16]; 256] {
+    let mut table = [[0x80; 16]; 256];
+    let mut set = 0;
+    while set < 256 {
+        let (mut from, mut to) = (0, 0);
+        while from < 8 {
+            if set >> from & 1 == 1 {
+                table[set][2 * to] = 2 * from as u8;
+                table[set][2 * to + 1] = 2 * from as u8 + 1;
+                to += 1;
+            }
+            from += 1;
+        }
+        set += 1;
+    }
+    table
+}
+
+impl Simd for Avx512 {
+    type F32 = __m256;
+
+    #[inline]
+    fn run<K: Kernel>(self, kernel: K) -> K::Output {
+        // SAFETY: a token exists only where every feature of `enter_avx512` was detected.
+        unsafe { enter_avx512(self, kernel) }
+    }
+    arithmetic!();
+    #[inline(always)]
+    fn le(self, a: __m256, b: __m256) -> u32 {
+        // SAFETY: a token exists only where AVX-512 F and VL were detected.
+        u32::from(unsafe { _mm256_cmp_ps_mask::<_CMP_LE_OQ>(a, b) })
+    }
+    #[inline(always)]
+    fn straddles_zero(self, a: __m256, b: __m256) -> u32 {
+        // SAFETY: as for `le`.
+        unsafe {
+            let zero = _mm256_setzero_ps();
+            let below = _mm256_cmp_ps_mask::<_CMP_LT_OQ>(a, zero);
+            u32::from(_mm256_mask_cmp_ps_mask::<_CMP_GT_OQ>(below, b, zero))
+        }
+    }
+    #[inline(always)]
+    fn compact(self, masks: &[u8], bit: u32, ids: &[u16], out: &mut [u16]) -> usize {
+        let mut count = 0;
+        for (masks, ids) in masks.chunks_exact(GROUP).zip(ids.chunks_exact(GROUP)) {
+            let out = &mut out[count..count + GROUP];
+            // SAFETY: a token exists only where AVX-512 F, BW, VL and VBMI2 were detected; `masks` has 32 readable
+            // bytes, `ids` 64 readable and `out` 64 writable ones, and no access asks for alignment.
+            unsafe {
+                let bits = _mm256_set1_epi8((1u8 << bit) as i8);
+                let wanted = _mm256_test_epi8_mask(_mm256_loadu_si256(masks.as_ptr().cast()), bits);
+                let chosen = _mm512_maskz_compress_epi16(wanted, _mm512_loadu_si512(ids.as_ptr().cast()));
+                _mm512_storeu_si512(out.as_mut_ptr().cast(), chosen);
+                count += wanted.count_ones() as usize;
+            }
+        }
+        count
     }
 }

@@ -1,11 +1,12 @@
 //! Batches: where rays are gathered, checked and handed to the kernel that fits.
 
-use std::marker::PhantomData;
+use std::{cell::RefCell, marker::PhantomData};
 
 use super::{
     frame::Frame,
     kernel::{self, Entry},
     probe::{Counts, Probe, Silent},
+    stream::{self, Bin, Lists},
 };
 use crate::{
     Error, Job, Mesh,
@@ -34,8 +35,8 @@ impl<'a> Tracer<'a> {
     /// [`Error::Ray`] for the first unusable ray.
     pub fn closest(self, rays: &Rays<'_>, hits: &mut HitsMut<'_>) -> Result<(), Error> {
         assert_eq!(rays.len(), hits.len());
-        let take = |index, frame: &Frame, hit: Hit, _: Silent| hits.set(index, in_ray_units(frame, hit));
-        self.level.run(Batch { tracer: self, rays, any: false, take, probe: PhantomData })
+        let take = |index, frame: &Frame, hit: Hit| hits.set(index, in_ray_units(frame, hit));
+        self.silent(rays, false, take)
     }
 
     /// Whether anything lies in the interval of every ray, on the calling thread.
@@ -44,19 +45,52 @@ impl<'a> Tracer<'a> {
     /// [`Error::Ray`] for the first unusable ray.
     pub fn occluded(self, rays: &Rays<'_>, occluded: &mut [bool]) -> Result<(), Error> {
         assert_eq!(rays.len(), occluded.len());
-        let take = |index: usize, _: &Frame, hit: Hit, _: Silent| occluded[index] = hit.primitive != MISS;
-        self.level.run(Batch { tracer: self, rays, any: true, take, probe: PhantomData })
+        let take = |index: usize, _: &Frame, hit: Hit| occluded[index] = hit.primitive != MISS;
+        self.silent(rays, true, take)
     }
 
-    /// What the closest-hit query of every ray costs, on the calling thread.
+    /// What the closest-hit query of every ray costs where it walks alone, on the calling thread.
     ///
     /// # Errors
     /// [`Error::Ray`] for the first unusable ray.
     pub fn counted(self, rays: &Rays<'_>, counts: &mut [Counts]) -> Result<(), Error> {
         assert_eq!(rays.len(), counts.len());
         let take = |index: usize, _: &Frame, _: Hit, seen: Counts| counts[index] = seen;
-        self.level.run(Batch { tracer: self, rays, any: false, take, probe: PhantomData })
+        self.with_room(|room| {
+            self.level.run(Singles { tracer: self, rays, any: false, take, room, probe: PhantomData })
+        })
     }
+
+    fn silent(self, rays: &Rays<'_>, any: bool, mut take: impl FnMut(usize, &Frame, Hit)) -> Result<(), Error> {
+        self.with_room(|room| {
+            if rays.len() >= LEAST_STREAM {
+                self.level.run(Streams { tracer: self, rays, any, take, room })
+            } else {
+                let take = |index: usize, frame: &Frame, hit: Hit, _: Silent| take(index, frame, hit);
+                self.level.run(Singles { tracer: self, rays, any, take, room, probe: PhantomData })
+            }
+        })
+    }
+
+    /// Lend `work` this thread's room.
+    fn with_room<R>(self, work: impl FnOnce(&mut Room) -> R) -> R {
+        thread_local!(static ROOM: RefCell<Room> = RefCell::default());
+        ROOM.with_borrow_mut(|room| {
+            room.stack.resize(self.structure.stack_size.max(room.stack.len()), Entry::NONE);
+            work(room)
+        })
+    }
+}
+
+/// Smaller batches are traced ray by ray.
+const LEAST_STREAM: usize = 64;
+
+/// What traversals need to remember things in, reused from batch to batch.
+#[derive(Default)]
+struct Room {
+    stack: Vec<Entry>,
+    bins: [Bin; 8],
+    lists: Lists,
 }
 
 #[inline(always)]
@@ -64,47 +98,101 @@ fn in_ray_units(frame: &Frame, hit: Hit) -> Hit {
     if hit.primitive == MISS { Hit::MISS } else { Hit { t: frame.parameter(hit.t), ..hit } }
 }
 
-/// Rays, and what to do with the index, frame, hit (in the frame's units) and probe of each.
-struct Batch<'a, F, P> {
+/// Rays that walk alone, and what to do with the index, frame, hit (in the frame's units) and probe of each.
+struct Singles<'a, F, P> {
     tracer: Tracer<'a>,
     rays: &'a Rays<'a>,
     any: bool,
     take: F,
+    room: &'a mut Room,
     probe: PhantomData<P>,
 }
 
-impl<F: FnMut(usize, &Frame, Hit, P), P: Probe + Default> Kernel for Batch<'_, F, P> {
+/// Rays that walk together, and what to do with the index, frame and hit (in the frame's units) of each.
+struct Streams<'a, F> {
+    tracer: Tracer<'a>,
+    rays: &'a Rays<'a>,
+    any: bool,
+    take: F,
+    room: &'a mut Room,
+}
+
+/// The table that picks a loop's instance, once a batch.
+macro_rules! pick_instance {
+    ($batch:ident, $simd:ident) => {
+        match ($batch.tracer.structure.grids.is_empty(), $batch.any) {
+            (true, false) => $batch.each::<S, false, false>($simd),
+            (true, true) => $batch.each::<S, false, true>($simd),
+            (false, false) => $batch.each::<S, true, false>($simd),
+            (false, true) => $batch.each::<S, true, true>($simd),
+        }
+    };
+}
+
+impl<F: FnMut(usize, &Frame, Hit, P), P: Probe + Default> Kernel for Singles<'_, F, P> {
     type Output = Result<(), Error>;
 
-    /// The table that picks the loop's instance, once a batch.
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> Self::Output {
-        match (self.tracer.structure.grids.is_empty(), self.any) {
-            (true, false) => self.each::<S, false, false>(simd),
-            (true, true) => self.each::<S, false, true>(simd),
-            (false, false) => self.each::<S, true, false>(simd),
-            (false, true) => self.each::<S, true, true>(simd),
-        }
+        pick_instance!(self, simd)
     }
 }
 
-impl<F: FnMut(usize, &Frame, Hit, P), P: Probe + Default> Batch<'_, F, P> {
+impl<F: FnMut(usize, &Frame, Hit)> Kernel for Streams<'_, F> {
+    type Output = Result<(), Error>;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> Self::Output {
+        pick_instance!(self, simd)
+    }
+}
+
+impl<F: FnMut(usize, &Frame, Hit, P), P: Probe + Default> Singles<'_, F, P> {
     #[inline(always)]
     fn each<S: Simd, const GRIDS: bool, const ANY: bool>(mut self, simd: S) -> Result<(), Error> {
         let Tracer { structure, mesh, .. } = self.tracer;
-        let mut stack = vec![Entry::NONE; structure.stack_size];
         for index in 0..self.rays.len() {
             let frame = self.rays.frame(index, &structure.domain)?;
             let mut probe = P::default();
-            let hit = kernel::trace::<S, P, GRIDS, ANY>(simd, structure, mesh, &frame, &mut stack, &mut probe);
+            let stack = &mut self.room.stack;
+            let hit = kernel::trace::<S, P, GRIDS, ANY>(simd, structure, mesh, &frame, stack, &mut probe);
             (self.take)(index, &frame, hit, probe);
         }
         Ok(())
     }
 }
 
+impl<F: FnMut(usize, &Frame, Hit)> Streams<'_, F> {
+    #[inline(always)]
+    fn each<S: Simd, const GRIDS: bool, const ANY: bool>(mut self, simd: S) -> Result<(), Error> {
+        self.room.bins.iter_mut().for_each(Bin::clear);
+        for index in 0..self.rays.len() {
+            let frame = self.rays.frame(index, &self.tracer.structure.domain)?;
+            let octant = frame.octant();
+            self.room.bins[octant].push(index, frame);
+            if self.room.bins[octant].is_full() {
+                self.flush::<S, GRIDS, ANY>(simd, octant);
+            }
+        }
+        for octant in 0..8 {
+            self.flush::<S, GRIDS, ANY>(simd, octant);
+        }
+        Ok(())
+    }
+
+    #[inline(always)]
+    fn flush<S: Simd, const GRIDS: bool, const ANY: bool>(&mut self, simd: S, octant: usize) {
+        let Tracer { structure, mesh, .. } = self.tracer;
+        let Room { stack, bins, lists } = &mut *self.room;
+        let bin = &mut bins[octant];
+        stream::trace::<S, GRIDS, ANY>(simd, structure, mesh, octant, bin, lists, stack);
+        bin.rays().for_each(|(index, frame, hit)| (self.take)(index, frame, *hit));
+        bin.clear();
+    }
+}
+
 /// Rays between two looks at the job: a few milliseconds of work even on slow structures.
-const PART: usize = 2048;
+const PART: usize = 1 << 13;
 
 impl Tracer<'_> {
     /// [`Tracer::closest`] on several threads; 0 means all.

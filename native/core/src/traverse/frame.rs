@@ -52,31 +52,32 @@ impl Domain {
     }
 }
 
-/// See the module's text.
+/// See the module's text. Two cache lines: what box tests read, then what triangle tests read.
 #[derive(Debug, Clone)]
+#[repr(C, align(64))]
 pub struct Frame {
-    /// Origin of the triangle test, in the mesh's own coordinates.
-    pub origin: [f32; 3],
-    /// Direction, its largest component in [1, 2).
-    pub direction: [f32; 3],
-    /// Axes in the order x, y, z of the sheared space; z is the direction's dominant one.
-    pub axes: [usize; 3],
-    /// Direction over its dominant component, for the sheared x and y.
-    pub shear: [f32; 2],
     /// Inverse of the direction, finite.
     pub inverse: [f32; 3],
     /// What is added to `plane * inverse` for the near planes of dilated boxes.
     pub near_bias: [f32; 3],
     /// What is added to `plane * inverse` for the far planes of dilated boxes.
     pub far_bias: [f32; 3],
-    /// Origin relative to the centre of the domain.
-    pub local: [f32; 3],
     /// The interval, in the frame's own units.
     pub tmin: f32,
     /// The interval, in the frame's own units.
     pub tmax: f32,
-    scale: f32,
+    /// Origin relative to the centre of the domain.
+    pub local: [f32; 3],
     advance: f64,
+    /// Origin of the triangle test, in the mesh's own coordinates.
+    pub origin: [f32; 3],
+    /// Direction over its dominant component, for the sheared x and y.
+    pub shear: [f32; 2],
+    /// Axes in the order x, y, z of the sheared space; z is the direction's dominant one.
+    pub axes: [u32; 3],
+    /// Direction, its largest component in [1, 2).
+    pub direction: [f32; 3],
+    scale: f32,
 }
 
 impl Frame {
@@ -111,7 +112,7 @@ impl Frame {
             origin: origin.to_array(),
             direction: d,
             axes,
-            shear: [d[axes[0]] / d[axes[2]], d[axes[1]] / d[axes[2]]],
+            shear: [d[axes[0] as usize] / d[axes[2] as usize], d[axes[1] as usize] / d[axes[2] as usize]],
             inverse,
             near_bias: bias(-1.0),
             far_bias: bias(1.0),
@@ -121,6 +122,12 @@ impl Frame {
             scale,
             advance,
         }
+    }
+
+    /// The signs of the direction: bit `k` is set where it falls along axis `k`.
+    #[inline]
+    pub fn octant(&self) -> usize {
+        (0..3).fold(0, |octant, k| octant | usize::from(self.inverse[k] < 0.0) << k)
     }
 
     /// A parameter of the frame in lengths of the ray's own direction, from its own origin.
@@ -136,7 +143,7 @@ impl Frame {
 
 /// Sheared z is the axis along which the ray is steepest.
 #[inline]
-fn dominant_last(direction: Vec3) -> [usize; 3] {
+fn dominant_last(direction: Vec3) -> [u32; 3] {
     let a = direction.abs();
     if a.x >= a.y && a.x >= a.z {
         [1, 2, 0]

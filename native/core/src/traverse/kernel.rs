@@ -74,9 +74,23 @@ pub fn trace<S: Simd, P: Probe, const GRIDS: bool, const ANY: bool>(
     probe: &mut P,
 ) -> Hit {
     let mut search = Search::new(simd, frame, probe);
-    let planes = Planes::new(simd, frame);
+    trace_below::<S, P, GRIDS, ANY>(&mut search, structure, mesh, structure.root, stack);
+    search.best
+}
+
+/// Go on with a search below `node`.
+#[inline(always)]
+pub fn trace_below<S: Simd, P: Probe, const GRIDS: bool, const ANY: bool>(
+    search: &mut Search<'_, S, P>,
+    structure: &Structure,
+    mesh: &Mesh,
+    node: NodeRef,
+    stack: &mut [Entry],
+) {
+    let simd = search.simd;
+    let planes = Planes::new(simd, search.frame);
     let mut depth = 0;
-    let mut current = structure.root;
+    let mut current = node;
     loop {
         let found = match current.target() {
             Target::Branch(index) => {
@@ -91,16 +105,16 @@ pub fn trace<S: Simd, P: Probe, const GRIDS: bool, const ANY: bool>(
             }
             Target::Leaf { block, count } => search.block(&structure.blocks[block as usize], count),
             Target::Grid(index) if GRIDS => {
-                dda::walk::<S, P, ANY>(&mut search, structure, mesh, &structure.grids[index as usize])
+                dda::walk::<S, P, ANY>(search, structure, mesh, &structure.grids[index as usize])
             }
             Target::Grid(_) | Target::Empty => false,
         };
         if ANY && found {
-            return search.best;
+            return;
         }
         match pop(stack, &mut depth, search.best.t) {
             Some(node) => current = node,
-            None => return search.best,
+            None => return,
         }
     }
 }

@@ -68,7 +68,8 @@ impl<'a, S: Simd, P: Probe> Search<'a, S, P> {
     }
 
     #[inline(always)]
-    fn relative(&self, corner: &[[f32; LANES]; 3], axis: usize) -> S::F32 {
+    fn relative(&self, corner: &[[f32; LANES]; 3], axis: u32) -> S::F32 {
+        let axis = axis as usize;
         self.simd.sub(self.simd.load(&corner[axis]), self.simd.splat(self.frame.origin[axis]))
     }
 

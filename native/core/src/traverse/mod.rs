@@ -6,5 +6,6 @@ pub mod frame;
 mod kernel;
 mod leaf;
 pub mod probe;
+mod stream;
 
 pub use batch::Tracer;

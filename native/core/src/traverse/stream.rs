@@ -1,0 +1,249 @@
+//! Streams: many rays of one octant walk the tree together, so that every node and block is fetched once for all of
+//! them, and its children come in one order for all. After Barringer and Akenine-Möller, "Dynamic Ray Stream
+//! Traversal", ACM TOG 33(4), 2014, and Fuetterling, Lojewski, Pfreundt and Ebert, "Efficient Ray Tracing Kernels for
+//! Modern CPU Architectures", JCGT 4(4), 2015.
+//!
+//! Every ray keeps its own interval, boxes and triangles are tested by the arithmetic of the single ray, and the first
+//! hit in the order of [`Hit::precedes`] does not depend on the order of tests: results equal the single ray's.
+
+use super::{frame::Frame, kernel, leaf::Search, probe::Silent};
+use crate::{
+    Mesh,
+    accel::structure::{Node, NodeRef, Structure, Target},
+    ray::{Hit, MISS},
+    simd::{GROUP, Simd},
+    triangle::{Block, LANES},
+};
+
+/// Rays that walk together. More would outgrow the second-level cache: 16 times as many were slower, but on soups.
+pub const BIN: usize = 1024;
+
+/// Fewer rays than this go on one by one from where they are.
+const FEW: usize = 3;
+
+/// Rays of one octant, waiting to be traced.
+#[derive(Debug, Default)]
+pub struct Bin {
+    frames: Vec<Frame>,
+    hits: Vec<Hit>,
+    indices: Vec<u32>,
+}
+
+impl Bin {
+    /// Add a ray of the batch.
+    #[inline(always)]
+    pub fn push(&mut self, index: usize, frame: Frame) {
+        self.hits.push(Hit { t: frame.tmax, ..Hit::MISS });
+        self.frames.push(frame);
+        self.indices.push(index as u32);
+    }
+
+    /// Whether no more rays fit.
+    #[inline(always)]
+    pub fn is_full(&self) -> bool {
+        self.frames.len() == BIN
+    }
+
+    /// Batch index, frame and hit of every ray.
+    pub fn rays(&self) -> impl Iterator<Item = (usize, &Frame, &Hit)> {
+        let rays = self.indices.iter().zip(&self.frames).zip(&self.hits);
+        rays.map(|((index, frame), hit)| (*index as usize, frame, hit))
+    }
+
+    /// Forget all rays.
+    pub fn clear(&mut self) {
+        self.frames.clear();
+        self.hits.clear();
+        self.indices.clear();
+    }
+}
+
+/// A subtree, and which of [`Lists::ids`] are to visit it.
+#[derive(Debug, Clone, Copy)]
+struct Visit {
+    node: NodeRef,
+    start: u32,
+    count: u32,
+}
+
+/// Room for lists of ray ids, reused from bin to bin.
+#[derive(Debug, Default)]
+pub struct Lists {
+    visits: Vec<Visit>,
+    ids: Vec<u16>,
+    masks: Vec<u8>,
+}
+
+/// Trace all rays of a bin; `octant` is theirs.
+#[inline(always)]
+pub fn trace<S: Simd, const GRIDS: bool, const ANY: bool>(
+    simd: S,
+    structure: &Structure,
+    mesh: &Mesh,
+    octant: usize,
+    bin: &mut Bin,
+    lists: &mut Lists,
+    stack: &mut [kernel::Entry],
+) {
+    if bin.frames.is_empty() {
+        return;
+    }
+    lists.begin(structure.root, bin.frames.len());
+    while let Some(visit) = lists.visits.pop() {
+        let ids = visit.start as usize..(visit.start + visit.count) as usize;
+        match visit.node.target() {
+            _ if ids.len() < FEW => {
+                for &id in &lists.ids[ids] {
+                    let ray = Single { frame: &mut bin.frames[id as usize], best: &mut bin.hits[id as usize] };
+                    ray.trace::<S, GRIDS, ANY>(simd, structure, mesh, visit.node, stack);
+                }
+            }
+            Target::Branch(index) => branch(simd, &structure.nodes[index as usize], octant, ids, &bin.frames, lists),
+            Target::Leaf { block, count } => {
+                let block = &structure.blocks[block as usize];
+                for &id in &lists.ids[ids] {
+                    let ray = Single { frame: &mut bin.frames[id as usize], best: &mut bin.hits[id as usize] };
+                    ray.block::<S, ANY>(simd, block, count);
+                }
+            }
+            Target::Grid(_) | Target::Empty => {
+                for &id in &lists.ids[ids] {
+                    let ray = Single { frame: &mut bin.frames[id as usize], best: &mut bin.hits[id as usize] };
+                    ray.trace::<S, GRIDS, ANY>(simd, structure, mesh, visit.node, stack);
+                }
+            }
+        }
+    }
+}
+
+/// Divide the rays at a node among its children, the nearest child's on top.
+#[inline(always)]
+fn branch<S: Simd>(
+    simd: S,
+    node: &Node,
+    octant: usize,
+    ids: std::ops::Range<usize>,
+    frames: &[Frame],
+    lists: &mut Lists,
+) {
+    let padded = ids.len().next_multiple_of(GROUP);
+    let (start, mut end) = (ids.start, ids.end);
+    lists.make_room(end + (LANES + 1) * padded);
+    let planes = OctantPlanes::new(simd, node, octant);
+    let mut any = 0;
+    for (mask, &id) in lists.masks.iter_mut().zip(&lists.ids[ids.clone()]) {
+        let met = planes.meet(simd, &frames[id as usize]);
+        *mask = met as u8;
+        any |= met;
+    }
+    lists.masks[ids.len()..padded].fill(0);
+    let mut order = node.order[octant];
+    for _ in 0..LANES {
+        let child = order & 7;
+        order >>= 3;
+        if any >> child & 1 == 0 {
+            continue;
+        }
+        let (from, to) = lists.ids.split_at_mut(end.max(start + padded));
+        let offset = end.max(start + padded);
+        let count = simd.compact(&lists.masks[..padded], child, &from[start..start + padded], &mut to[..padded]);
+        lists.visits.push(Visit { node: node.child[child as usize], start: offset as u32, count: count as u32 });
+        end = offset + count;
+    }
+}
+
+impl Lists {
+    fn begin(&mut self, root: NodeRef, count: usize) {
+        self.masks.resize(BIN.next_multiple_of(GROUP), 0);
+        self.make_room(2 * BIN);
+        for (id, slot) in self.ids[..count].iter_mut().enumerate() {
+            *slot = id as u16;
+        }
+        self.visits.push(Visit { node: root, start: 0, count: count as u32 });
+    }
+
+    #[inline(always)]
+    fn make_room(&mut self, length: usize) {
+        if self.ids.len() < length {
+            self.ids.resize(2 * length, 0);
+        }
+    }
+}
+
+/// The planes of a node's children, near and far for one octant.
+struct OctantPlanes<S: Simd> {
+    near: [S::F32; 3],
+    far: [S::F32; 3],
+}
+
+impl<S: Simd> OctantPlanes<S> {
+    #[inline(always)]
+    fn new(simd: S, node: &Node, octant: usize) -> Self {
+        let [mut near, mut far] = [[simd.splat(0.0); 3]; 2];
+        for k in 0..3 {
+            let side = 3 * (octant >> k & 1);
+            near[k] = simd.load(&node.plane[k + side]);
+            far[k] = simd.load(&node.plane[k + 3 - side]);
+        }
+        Self { near, far }
+    }
+
+    /// The children that a ray meets within its interval.
+    #[inline(always)]
+    fn meet(&self, simd: S, frame: &Frame) -> u32 {
+        let (mut near, mut far) = (simd.splat(frame.tmin), simd.splat(frame.tmax));
+        for k in 0..3 {
+            let inverse = simd.splat(frame.inverse[k]);
+            near = simd.max(simd.mul_add(self.near[k], inverse, simd.splat(frame.near_bias[k])), near);
+            far = simd.min(simd.mul_add(self.far[k], inverse, simd.splat(frame.far_bias[k])), far);
+        }
+        simd.le(near, far)
+    }
+}
+
+/// One ray of a bin.
+struct Single<'a> {
+    frame: &'a mut Frame,
+    best: &'a mut Hit,
+}
+
+impl Single<'_> {
+    /// Test a block.
+    #[inline(always)]
+    fn block<S: Simd, const ANY: bool>(self, simd: S, block: &Block, count: u32) {
+        if self.frame.tmin > self.frame.tmax {
+            return;
+        }
+        let mut search = Search { simd, frame: self.frame, probe: &mut Silent, best: *self.best };
+        if search.block(block, count) {
+            let best = search.best;
+            self.keep::<ANY>(best);
+        }
+    }
+
+    /// Go on alone below `node`.
+    #[inline(always)]
+    fn trace<S: Simd, const GRIDS: bool, const ANY: bool>(
+        self,
+        simd: S,
+        structure: &Structure,
+        mesh: &Mesh,
+        node: NodeRef,
+        stack: &mut [kernel::Entry],
+    ) {
+        if self.frame.tmin > self.frame.tmax {
+            return;
+        }
+        let mut search = Search { simd, frame: self.frame, probe: &mut Silent, best: *self.best };
+        kernel::trace_below::<S, Silent, GRIDS, ANY>(&mut search, structure, mesh, node, stack);
+        let best = search.best;
+        self.keep::<ANY>(best);
+    }
+
+    /// Nothing beyond the best hit is of interest any more; where any hit will do, nothing at all.
+    #[inline(always)]
+    fn keep<const ANY: bool>(self, best: Hit) {
+        *self.best = best;
+        self.frame.tmax = if ANY && best.primitive != MISS { f32::NEG_INFINITY } else { best.t };
+    }
+}
