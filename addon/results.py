@@ -25,7 +25,14 @@ class Row(NamedTuple):
     cells: int | None = None
 
 
-_tables: dict[int, tuple[Row, ...]] = {}
+class Table(NamedTuple):
+    """The rows of a scene's last run, and what there is to say of it, one line each."""
+
+    rows: tuple[Row, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+_tables: dict[int, Table] = {}
 """By the scene's session_uid."""
 
 
@@ -52,14 +59,14 @@ def rows(run: Run) -> Iterator[Row]:
         yield from map(Row, run.method_names[len(finished) :])
 
 
-def store(scene_uid: int, table: Iterable[Row]) -> None:
-    """Make these rows the table of a scene."""
-    _tables[scene_uid] = tuple(table)
+def store(scene_uid: int, table: Iterable[Row], notes: Iterable[str]) -> None:
+    """Make these rows and notes the table of a scene."""
+    _tables[scene_uid] = Table(tuple(table), tuple(notes))
 
 
-def of(scene_uid: int) -> tuple[Row, ...]:
+def of(scene_uid: int) -> Table:
     """The table of a scene; empty where nothing was run."""
-    return _tables.get(scene_uid, ())
+    return _tables.get(scene_uid, Table())
 
 
 def drop(scene_uid: int) -> None:
