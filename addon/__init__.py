@@ -6,7 +6,16 @@ serve the command line outside Blender too; what needs bpy is imported in `regis
 
 from importlib import import_module
 
-MODULES: tuple[str, ...] = ("properties", "session", "engine", "borrowed_panels", "overlay", "operators", "ui")
+MODULES: tuple[str, ...] = (
+    "properties",
+    "session",
+    "engine",
+    "borrowed_panels",
+    "overlay",
+    "operators",
+    "ui",
+    "command_line",
+)
 """Modules of this package that have `register()` and `unregister()`, in the order they are registered."""
 
 

@@ -67,3 +67,19 @@ class CaptureError(EspalierAddonError):
         super().__init__(
             f"The scene cannot be evaluated for a render ({reason}): wait until no render or bake is under way"
         )
+
+
+class CancelledError(EspalierAddonError):
+    """The user cancelled."""
+
+    def __init__(self) -> None:
+        super().__init__("Cancelled")
+
+
+class ComparisonSaveError(EspalierAddonError):
+    """The copy of the file that Cycles renders cannot be written."""
+
+    def __init__(self, reason: str) -> None:
+        super().__init__(
+            f"A copy of the scene for Cycles cannot be saved ({reason}): free space in the temporary folder"
+        )

@@ -25,14 +25,7 @@ class Row(NamedTuple):
     cells: int | None = None
 
 
-class Table(NamedTuple):
-    """The rows of a scene's last run, and what there is to say of it, one line each."""
-
-    rows: tuple[Row, ...] = ()
-    notes: tuple[str, ...] = ()
-
-
-_tables: dict[int, Table] = {}
+_tables: dict[int, tuple[Row, ...]] = {}
 """By the scene's session_uid."""
 
 
@@ -59,14 +52,14 @@ def rows(run: Run) -> Iterator[Row]:
         yield from map(Row, run.method_names[len(finished) :])
 
 
-def store(scene_uid: int, table: Iterable[Row], notes: Iterable[str]) -> None:
-    """Make these rows and notes the table of a scene."""
-    _tables[scene_uid] = Table(tuple(table), tuple(notes))
+def store(scene_uid: int, table: Iterable[Row]) -> None:
+    """Make these rows the table of a scene."""
+    _tables[scene_uid] = tuple(table)
 
 
-def of(scene_uid: int) -> Table:
+def of(scene_uid: int) -> tuple[Row, ...]:
     """The table of a scene; empty where nothing was run."""
-    return _tables.get(scene_uid, Table())
+    return _tables.get(scene_uid, ())
 
 
 def drop(scene_uid: int) -> None:

@@ -19,7 +19,10 @@ and show times, image and cells"""
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return reasons.can_trace(cls, context)
+        reason = reasons.no_trace(context)
+        if reason is not None:
+            cls.poll_message_set(reason)
+        return reason is None
 
     def begin(self, context: bpy.types.Context) -> Task:
         scene = context.scene
@@ -27,12 +30,12 @@ and show times, image and cells"""
         data = capture.export_frame(scene, context.view_layer)
         chosen = [name for name in methods.METHOD_NAMES if name in settings.methods]
         self._session = session.start(scene, data, chosen, session.Options.of(settings))
+        self._scene_uid = scene.session_uid
         self._shown_method = settings.method
         return self._session.run
 
     def advance(self, _context: bpy.types.Context) -> None:
-        run = self._session.run
-        results.store(self._scene_uid, results.rows(run), run.data.warnings)
+        results.store(self._scene_uid, results.rows(self._session.run))
 
     def finish(self, _context: bpy.types.Context) -> str:
         finished = self._session.run.results

@@ -5,7 +5,7 @@ from typing import Any, ClassVar, Protocol
 
 import bpy
 
-from .. import native, results
+from .. import native
 from ..areas import redraw
 from ..errors import EspalierAddonError
 
@@ -63,7 +63,6 @@ class TaskOperator:
     finish: Callable[[bpy.types.Context], str]
 
     _task: Task
-    _scene_uid: int
     _timer: Any = None
     bl_options: ClassVar[set[str]] = set()
 
@@ -108,7 +107,6 @@ class TaskOperator:
         if window is not None:
             window.cursor_set("WAIT")
         try:
-            self._scene_uid = context.scene.session_uid
             self._task = _current = self.begin(context)
         except expected_errors() as error:
             self.report({"ERROR"}, str(error))
@@ -128,13 +126,10 @@ class TaskOperator:
             return {"CANCELLED"}
         try:
             self._task.raise_error()
-            message = self.finish(context)
+            self.report({"INFO"}, self.finish(context))
         except expected_errors() as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        for note in results.of(self._scene_uid).notes:
-            self.report({"WARNING"}, note)
-        self.report({"INFO"}, message)
         return {"FINISHED"}
 
     def _release(self, context: bpy.types.Context) -> None:

@@ -1,0 +1,205 @@
+"""The command `espalier`: in a shell, and as `blender --command espalier`. It imports without bpy.
+
+Exit status: 0 done, 2 for input, options or a folder that cannot be used (one line on stderr says why), 130 for
+Ctrl C. Any other end is a bug, and shows its traceback.
+"""
+
+import argparse
+import contextlib
+import signal
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any, NoReturn, TextIO
+
+from . import catalogue, input_kinds
+from .errors import EspalierAddonError
+from .images import write_png
+from .methods import METHOD_NAMES
+from .outputs import OutputFolder
+from .terminal import ProgressLine, own_streams
+
+MAX_PIXELS = 65536
+USAGE_STATUS, INTERRUPTED_STATUS = 2, 130
+
+
+class UsageError(EspalierAddonError):
+    """An option that cannot be used."""
+
+
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> NoReturn:
+        raise UsageError(f"{message[0].upper()}{message[1:]}: see '{self.prog} --help'")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command and give its exit status. arguments None: the shell's."""
+    try:
+        options = _parser().parse_args(sys.argv[1:] if arguments is None else list(arguments))
+        return int(options.run(options))
+    except KeyboardInterrupt:
+        print("espalier: interrupted", file=sys.stderr)
+        return INTERRUPTED_STATUS
+    except _expected_errors() as error:
+        print(f"espalier: {error}", file=sys.stderr)
+        return USAGE_STATUS
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(prog="espalier", description="Trace a scene through BVH, uniform grid and hybrids of both.")
+    commands = parser.add_subparsers(required=True, metavar="COMMAND", parser_class=_Parser)
+    compare = commands.add_parser("compare", help="compare acceleration methods, and Cycles, on one frame")
+    compare.set_defaults(run=_compare)
+    compare.add_argument("input", metavar="INPUT", help="a .blend, a mesh (.ply .obj .stl .glb), or a scene's name")
+    compare.add_argument("--methods", type=_methods, default=METHOD_NAMES, help=f"some of {','.join(METHOD_NAMES)}")
+    compare.add_argument("--resolution", type=_resolution, metavar="WxH", help="a .blend's own, else 1000x1000")
+    compare.add_argument("--samples", type=_count(1, 1 << 20), default=1, metavar="N", help="rays a pixel (1)")
+    compare.add_argument("--threads", type=_count(0, 1024), default=0, metavar="N", help="0, the default: all cores")
+    compare.add_argument("--cycles", action=argparse.BooleanOptionalAction, default=True, help="render with Cycles too")
+    compare.add_argument("--frame", type=_count(-1048574, 1048574), metavar="N", help="frame of a .blend")
+    compare.add_argument("--out", type=Path, metavar="DIR", help="where pictures and report go (out/NAME)")
+    scenes = commands.add_parser("scenes", help="list the scenes of the catalogue")
+    scenes.set_defaults(run=_list_scenes)
+    return parser
+
+
+def _methods(text: str) -> tuple[str, ...]:
+    names = tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
+    unknown = [name for name in names if name not in METHOD_NAMES]
+    if unknown or not names:
+        raise argparse.ArgumentTypeError(f"no method '{', '.join(unknown)}', choose from {', '.join(METHOD_NAMES)}")
+    return names
+
+
+def _resolution(text: str) -> tuple[int, int]:
+    sides = text.lower().split("x")
+    if len(sides) != 2 or not all(side.isascii() and side.isdigit() and 1 <= int(side) <= MAX_PIXELS for side in sides):
+        raise argparse.ArgumentTypeError(f"'{text}' is no WIDTHxHEIGHT of 1 to {MAX_PIXELS} pixels")
+    return int(sides[0]), int(sides[1])
+
+
+def _count(least: int, most: int) -> Any:
+    """A parser of whole numbers in a range."""
+
+    def parse(text: str) -> int:
+        try:
+            value = int(text)
+        except ValueError:
+            value = least - 1
+        if not least <= value <= most:
+            raise argparse.ArgumentTypeError(f"'{text}' is no whole number from {least} to {most}")
+        return value
+
+    return parse
+
+
+def _list_scenes(_options: argparse.Namespace) -> int:
+    width = max(map(len, catalogue.names()))
+    for entry in catalogue.module().ENTRIES:
+        print(f"{entry.name.ljust(width)}  {entry.purpose}")
+    return 0
+
+
+def _compare(options: argparse.Namespace) -> int:
+    input_kinds.check(options.input)
+    folder = options.out or Path("out") / Path(options.input).stem
+    with OutputFolder(folder) as outputs, own_streams() as (stdout, stderr), _blender():
+        outcome, notes = _trace(options, stderr)
+        outputs.publish(_writers(outcome))
+        stdout.write(f"\n{outcome.report.table()}")
+        stdout.writelines(f"Note: {note}\n" for note in notes)
+        stdout.write(f"\nPictures and report: {folder}\n")
+    return 0
+
+
+def _trace(options: argparse.Namespace, stderr: TextIO) -> tuple[Any, list[str]]:
+    """The outcome of the comparison, and notes on what was added to the scene or left out of it."""
+    from . import compare, inputs
+    from .run import Options
+
+    line = ProgressLine(stderr)
+    try:
+        line.update(0.0, f"Open {options.input}")
+        opened = inputs.open_input(
+            options.input,
+            options.frame,
+            options.resolution,
+            lambda progress: line.update(progress, f"Download {options.input}"),
+        )
+        settings = compare.Settings(
+            methods=options.methods,
+            options=Options(samples=options.samples, threads=options.threads),
+            resolution=opened.resolution,
+            cycles=options.cycles,
+        )
+        outcome = compare.run(opened.scene, settings, progress=line.update)
+    finally:
+        line.close()
+    return outcome, [*opened.notes, *outcome.notes]
+
+
+def _writers(outcome: Any) -> dict[str, Any]:
+    """What writes each file, by its name."""
+    pictures = {"espalier.png": outcome.espalier}
+    if outcome.cycles is not None:
+        pictures |= {
+            "compare.png": outcome.picture,
+            "cycles.png": outcome.cycles,
+            "difference.png": outcome.difference,
+        }
+    writers = {name: lambda path, picture=picture: write_png(path, picture) for name, picture in pictures.items()}
+    return writers | {"report.json": lambda path: path.write_text(outcome.report.json(), encoding="utf-8")}
+
+
+@contextlib.contextmanager
+def _blender() -> Iterator[None]:
+    """Blender with the add-on registered, which the bpy module alone has not, and Ctrl C as Python knows it."""
+    try:
+        import bpy
+    except ImportError as error:
+        raise UsageError(
+            f"Blender's Python module cannot be loaded ({error}): pip install bpy, or use blender --command espalier"
+        ) from error
+    from . import register as register_addon
+    from . import unregister as unregister_addon
+
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    registered_here = not hasattr(bpy.types.Scene, "espalier")
+    if registered_here:
+        register_addon()
+    try:
+        yield
+    finally:
+        if registered_here:
+            unregister_addon()
+        signal.signal(signal.SIGINT, before)
+
+
+def _expected_errors() -> tuple[type[Exception], ...]:
+    """Errors whose message tells the user what to do."""
+    from . import native
+
+    errors: tuple[type[Exception], ...] = (EspalierAddonError, catalogue.module("errors").SceneCatalogueError)
+    with contextlib.suppress(EspalierAddonError):
+        errors += (native.module().EspalierError,)
+    return errors
+
+
+_handle: Any = None
+
+
+def register() -> None:
+    """Offer `blender --command espalier`."""
+    import bpy
+
+    global _handle
+    _handle = bpy.utils.register_cli_command("espalier", main)
+
+
+def unregister() -> None:
+    """Take the command away."""
+    import bpy
+
+    global _handle
+    bpy.utils.unregister_cli_command(_handle)
+    _handle = None

@@ -1,0 +1,73 @@
+"""Progress in a terminal, or in a log. No bpy.
+
+One way of drawing serves the shell and Blender's own Python, which has no package for it.
+"""
+
+import contextlib
+import os
+import tempfile
+import time
+from collections.abc import Iterator
+from typing import TextIO
+
+BAR_WIDTH = 28
+REDRAW_SECONDS = 0.1
+
+
+class ProgressLine:
+    """A bar that redraws itself in place; where the stream is no terminal, one line for each new status."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+        self._live = stream.isatty()
+        self._start = time.monotonic()
+        self._drawn = 0.0
+        self._last = ""
+
+    def update(self, progress: float, status: str) -> None:
+        """Show 0..1 and what is going on; cheap to call often."""
+        if not self._live:
+            self._log(status)
+            return
+        now = time.monotonic()
+        if now - self._drawn < REDRAW_SECONDS and progress < 1.0:
+            return
+        self._drawn = now
+        filled = round(progress * BAR_WIDTH)
+        bar = "#" * filled + "." * (BAR_WIDTH - filled)
+        self._stream.write(f"\r\x1b[K[{bar}] {progress:4.0%}  {now - self._start:5.1f} s  {status}")
+        self._stream.flush()
+
+    def close(self) -> None:
+        """Take the bar away."""
+        if self._live and self._drawn:
+            self._stream.write("\r\x1b[K")
+            self._stream.flush()
+
+    def _log(self, status: str) -> None:
+        phase = "Cycles" if status.startswith("Cycles:") else status
+        if phase and phase != self._last:
+            self._stream.write(f"{phase}\n")
+            self._stream.flush()
+            self._last = phase
+
+
+@contextlib.contextmanager
+def own_streams() -> Iterator[tuple[TextIO, TextIO]]:
+    """Our stdout and stderr, while what Blender's own code prints to file descriptors 1 and 2 goes to a scratch file.
+
+    Blender tells of every file it reads and writes, and of every step of Cycles; none of it is for our user.
+    """
+    kept = [os.dup(descriptor) for descriptor in (1, 2)]
+    streams = [os.fdopen(os.dup(descriptor), "w", encoding="utf-8", errors="replace") for descriptor in kept]
+    with tempfile.TemporaryFile() as scratch:
+        for descriptor in (1, 2):
+            os.dup2(scratch.fileno(), descriptor)
+        try:
+            yield streams[0], streams[1]
+        finally:
+            for descriptor, original in zip((1, 2), kept, strict=True):
+                os.dup2(original, descriptor)
+                os.close(original)
+            for stream in streams:
+                stream.close()
