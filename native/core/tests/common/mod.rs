@@ -1,6 +1,8 @@
 //! What the tests share: batches of rays, brute force, closed meshes.
 #![allow(dead_code)] // Each test file uses its own part.
 
+pub mod picture;
+
 use espalier_core::{
     Accelerator, Column, Config, Hits, Job, Mesh, Method, Rays,
     ray::{Hit, MISS, Ray},
