@@ -15,6 +15,7 @@ from mathutils import Matrix
 from ..errors import NoGeometryError, NonFiniteGeometryError
 from ..scene_data import GeometryData, SceneData
 from .camera import read_camera
+from .coordinates import move_uvs
 from .flatten import Placement, flatten
 from .images import Images
 from .lights import read_world
@@ -49,6 +50,7 @@ def export_scene(
     if not placements:
         raise NoGeometryError(name, view_layer.name)
     geometry = flatten(placements)
+    move_uvs(geometry, materials.uv_matrices)
     _require_finite(geometry, placements)
     return SceneData(
         name=name,

@@ -16,8 +16,10 @@ from dataclasses import replace
 from typing import Any
 
 import bpy
+from mathutils import Matrix
 
 from ..scene_data import Color, MaterialData
+from .coordinates import Coordinates, coordinates
 from .images import Images
 from .nodes import End, Node, Path, Socket, as_color, as_float, constant, follow, node_tree
 from .notes import Notes
@@ -29,10 +31,16 @@ IGNORED_WEIGHTS = ("Transmission Weight", "Subsurface Weight", "Coat Weight", "S
 
 
 class Materials:
-    """Every material of an export, in the order they first came up; index 0 is the one of faces without any."""
+    """Every material of an export, in the order they first came up; index 0 is the one of faces without any.
+
+    By the index of a textured material: `uv_maps` has the name of its UV map ('' is the active render map),
+    `uv_matrices` how its coordinates move, where they do.
+    """
 
     def __init__(self, images: Images, notes: Notes) -> None:
         self.materials: list[MaterialData] = [MaterialData("")]
+        self.uv_maps: dict[int, str] = {}
+        self.uv_matrices: dict[int, Matrix] = {}
         self._images = images
         self._notes = notes
         self._indices: dict[str, int] = {}
@@ -44,22 +52,27 @@ class Materials:
         name = material.name_full
         if name not in self._indices:
             self._indices[name] = len(self.materials)
-            self.materials.append(self._read(material))
+            self.materials.append(self._read(material, len(self.materials)))
         return self._indices[name]
 
-    def _read(self, material: bpy.types.Material) -> MaterialData:
+    def _read(self, material: bpy.types.Material, index: int) -> MaterialData:
         reader = _Reader(material, self._images)
         data = reader.read()
+        if reader.coordinates is not None:
+            self.uv_maps[index] = reader.coordinates.uv_map
+            if reader.coordinates.matrix != Matrix.Identity(4):
+                self.uv_matrices[index] = reader.coordinates.matrix
         if reader.approximated:
             self._notes.add(f"Material '{material.name}': approximated {', '.join(dict.fromkeys(reader.approximated))}")
         return data
 
 
 class _Reader:
-    """Reads one material; `approximated` names what is not traced as it is."""
+    """Reads one material; `approximated` names what is not traced as it is, `coordinates` where its texture lies."""
 
     def __init__(self, material: bpy.types.Material, images: Images) -> None:
         self.approximated: list[str] = []
+        self.coordinates: Coordinates | None = None
         self._material = material
         self._images = images
         self._plain = MaterialData(material.name, base_color=as_color(material.diffuse_color))
@@ -150,21 +163,15 @@ class _Reader:
         return self._plain if color is None else replace(self._plain, base_color=as_color(color))
 
     def _textured(self, node: Node, path: Path) -> MaterialData:
-        if node.projection != "FLAT" or not self._on_render_uvs(node, path):
+        placed = coordinates(node, path)
+        if placed is None:
             self._note(True, "texture coordinates")
             return self._plain
         texture = self._images.texture(node)
-        return replace(self._plain, base_color=PINK) if texture is None else replace(self._plain, texture=texture)
-
-    def _on_render_uvs(self, node: Node, path: Path) -> bool:
-        """Whether an image lies on a UV map; a map chosen by name is traced as the active render map, and noted."""
-        end = follow(node.inputs["Vector"], path)
-        if end.node is None:
-            return True
-        if end.node.type == "UVMAP":
-            self._note(bool(end.node.uv_map), f"UV map {end.node.uv_map} as the active render UV map")
-            return True
-        return end.node.type == "TEX_COORD" and end.socket.name == "UV"
+        if texture is None:
+            return replace(self._plain, base_color=PINK)
+        self.coordinates = placed
+        return replace(self._plain, texture=texture)
 
     def _emitted(self, socket: Socket, path: Path, strength: float) -> Color:
         """Radiance of the colour that reaches a socket times a strength."""

@@ -1,5 +1,6 @@
 """Reads one evaluated mesh into numpy arrays, in the mesh's own space, each array with one bulk call."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,7 +15,7 @@ from ..scene_data import Float32, UInt32
 class LocalMesh:
     """A triangulated mesh of n vertices, c face corners and m triangles, before any instance places it.
 
-    `slots` are material slot numbers; None means slot 0 everywhere. `uvs` is the active render UV map.
+    `slots` are material slot numbers; None means slot 0 everywhere. `uvs` are of the map that each slot asks for.
     """
 
     name: str
@@ -26,21 +27,26 @@ class LocalMesh:
     slots: NDArray[np.int32] | None  # (m,)
 
 
-def read_mesh(mesh: Any) -> LocalMesh | None:
-    """The arrays of a `bpy.types.Mesh`, or None where it has no face."""
+def read_mesh(mesh: Any, uv_maps: Sequence[str] = ("",)) -> LocalMesh | None:
+    """The arrays of a `bpy.types.Mesh`, or None where it has no face.
+
+    `uv_maps` names the UV map of every material slot; '' is the active render map.
+    """
     if len(mesh.polygons) == 0:
         return None
     mesh.calc_loop_triangles()
     triangles = len(mesh.loop_triangles)
     corners = len(mesh.loops)
+    slots = _slots(mesh, triangles)
+    triangle_corners = _read(mesh.loop_triangles, "loops", np.int32, (triangles, 3)).view(np.uint32)
     return LocalMesh(
         name=mesh.name,
         positions=_read(mesh.attributes["position"].data, "vector", np.float32, (len(mesh.vertices), 3)),
         corner_vertices=_read(mesh.attributes[".corner_vert"].data, "value", np.int32, (corners,)).view(np.uint32),
         corner_normals=_read(mesh.corner_normals, "vector", np.float32, (corners, 3)),
-        triangle_corners=_read(mesh.loop_triangles, "loops", np.int32, (triangles, 3)).view(np.uint32),
-        uvs=_render_uvs(mesh, corners),
-        slots=_slots(mesh, triangles),
+        triangle_corners=triangle_corners,
+        uvs=_uvs(mesh, uv_maps, slots, triangle_corners),
+        slots=slots,
     )
 
 
@@ -51,10 +57,32 @@ def _read(data: Any, name: str, dtype: type, shape: tuple[int, ...]) -> NDArray[
     return values
 
 
-def _render_uvs(mesh: bpy.types.Mesh, corners: int) -> Float32 | None:
-    """(c, 2) coordinates of the UV map that is active for rendering; None where the mesh has no map."""
-    layer = next((layer for layer in mesh.uv_layers if layer.active_render), None)
-    return None if layer is None else _read(layer.uv, "vector", np.float32, (corners, 2))
+def _uvs(
+    mesh: Any, uv_maps: Sequence[str], slots: NDArray[np.int32] | None, triangle_corners: UInt32
+) -> Float32 | None:
+    """(c, 2) coordinates of the map that each corner's slot asks for; zeros where there is no such map, as in Blender.
+
+    None where the mesh has no map at all.
+    """
+    if len(mesh.uv_layers) == 0:
+        return None
+    if slots is None or len(set(uv_maps)) == 1:
+        return _map(mesh, uv_maps[0])
+    maps = {name: _map(mesh, name) for name in set(uv_maps) if name}
+    uvs = _map(mesh, "")
+    used = np.clip(slots, 0, len(uv_maps) - 1)
+    for slot, name in enumerate(uv_maps):
+        if name:
+            corners = triangle_corners[used == slot]
+            uvs[corners] = maps[name][corners]
+    return uvs
+
+
+def _map(mesh: Any, name: str) -> Float32:
+    """(c, 2) coordinates of one UV map."""
+    found = [layer for layer in mesh.uv_layers if (layer.name == name if name else layer.active_render)]
+    shape = (len(mesh.loops), 2)
+    return _read(found[0].uv, "vector", np.float32, shape) if found else np.zeros(shape, np.float32)
 
 
 def _slots(mesh: bpy.types.Mesh, triangles: int) -> NDArray[np.int32] | None:

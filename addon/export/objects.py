@@ -1,6 +1,6 @@
 """Walks what renders in a view layer, and gathers meshes with their instances, and lights."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import bpy
@@ -57,12 +57,14 @@ class Objects:
     def _mesh(self, thing: Any, instance: Any) -> None:
         mesh = thing.data
         key = mesh.as_pointer()
+        slots = self._slots_of(thing, key)
         if key not in self._placements:
-            local = _read_edited(thing) if mesh.is_editmode else read_mesh(mesh)
+            uv_maps = [self._materials.uv_maps.get(index, "") for index in slots]
+            local = _read_edited(thing, uv_maps) if mesh.is_editmode else read_mesh(mesh, uv_maps)
             self._placements[key] = None if local is None else Placement(local)
         placement = self._placements[key]
         if placement is not None:
-            placement.add(self._matrix(instance), self._slots_of(thing, key))
+            placement.add(self._matrix(instance), slots)
 
     def _matrix(self, instance: Any) -> Matrix:
         """Local to world; the iterator reuses its own matrix, so this is a copy."""
@@ -93,10 +95,10 @@ class Objects:
             self._notes.add(f"Object '{thing.name}': hair particles are left out")
 
 
-def _read_edited(thing: Any) -> LocalMesh | None:
+def _read_edited(thing: Any, uv_maps: Sequence[str]) -> LocalMesh | None:
     """The mesh of an object in edit mode, whose arrays are empty until Blender converts its edits."""
     try:
-        return read_mesh(thing.to_mesh())
+        return read_mesh(thing.to_mesh(), uv_maps)
     finally:
         thing.to_mesh_clear()
 

@@ -53,7 +53,9 @@ def test_a_mesh_of_many_objects_is_read_once(monkeypatch):
         building.add(f"Object {x}", shared).location.x = 3.0 * x
     reads = []
     read_mesh = export.objects.read_mesh
-    monkeypatch.setattr(export.objects, "read_mesh", lambda mesh: reads.append(mesh.name) or read_mesh(mesh))
+    monkeypatch.setattr(
+        export.objects, "read_mesh", lambda mesh, maps: reads.append(mesh.name) or read_mesh(mesh, maps)
+    )
     data = building.export()
     assert reads == ["Shared"]
     assert (data.instance_count, data.geometry.mesh_count, data.triangle_count) == (10, 1, 20)

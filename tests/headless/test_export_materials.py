@@ -239,3 +239,70 @@ def test_an_emission_color_from_an_image_is_its_mean():
     material, data = exported(new)
     np.testing.assert_allclose(material.emission, (1.0, 0.5, 0.0), atol=1e-6)
     assert data.warnings == ("Material 'M': approximated emission color",)
+
+
+def on_map(name: str, uv_map: str) -> bpy.types.Material:
+    """A textured material whose image lies on a UV map by name."""
+    new = building.textured(name, building.image(name, np.ones((1, 1, 4))))
+    node = next(node for node in new.node_tree.nodes if node.type == "TEX_IMAGE")
+    coordinates = new.node_tree.nodes.new("ShaderNodeUVMap")
+    coordinates.uv_map = uv_map
+    new.node_tree.links.new(coordinates.outputs["UV"], node.inputs["Vector"])
+    return new
+
+
+def test_each_slot_gets_the_uv_map_that_its_material_names():
+    holder = building.add("Two", building.mesh("Two", building.SQUARE, ((0, 1, 2), (0, 2, 3))))
+    for index, name in enumerate(("First", "Second", "Third")):
+        holder.data.uv_layers.new(name=name).uv.foreach_set("vector", np.full(12, index + 1, np.float32))
+    holder.data.uv_layers["First"].active_render = True
+    for material in (on_map("A", ""), on_map("B", "Third")):
+        holder.data.materials.append(material)
+    holder.data.polygons[1].material_index = 1
+    data = building.export()
+    np.testing.assert_array_equal(data.geometry.corner_uvs[0], np.ones((3, 2)))
+    np.testing.assert_array_equal(data.geometry.corner_uvs[1], np.full((3, 2), 3.0))
+    assert data.warnings == ()
+    holder.material_slots[0].material = on_map("C", "Gone")
+    np.testing.assert_array_equal(building.export().geometry.corner_uvs[0], np.zeros((3, 2)))
+
+
+@pytest.mark.parametrize("kind", ["POINT", "TEXTURE", "VECTOR"])
+def test_mapping_nodes_move_the_coordinates_of_their_material_alone(kind):
+    from mathutils import Euler, Vector
+
+    new = building.textured("M", building.image("Image", np.ones((1, 1, 4))))
+    tree = new.node_tree
+    node = next(node for node in tree.nodes if node.type == "TEX_IMAGE")
+    mapping, coordinates = tree.nodes.new("ShaderNodeMapping"), tree.nodes.new("ShaderNodeTexCoord")
+    tree.links.new(coordinates.outputs["UV"], mapping.inputs["Vector"])
+    tree.links.new(mapping.outputs[0], node.inputs["Vector"])
+    mapping.vector_type = kind
+    location, rotation, scale = Vector((0.25, -0.5, 1.0)), Euler((0.0, 0.0, 0.3)), Vector((2.0, 3.0, 1.0))
+    mapping.inputs["Rotation"].default_value, mapping.inputs["Scale"].default_value = rotation, scale
+    if kind != "VECTOR":
+        mapping.inputs["Location"].default_value = location
+    uvs = np.array([0, 0, 1, 0, 1, 1, 0, 1], np.float32)
+    for name, material in (("Moved", new), ("Plain", building.material("Plain"))):
+        holder = building.square(name)
+        holder.data.uv_layers.new(name="Map").uv.foreach_set("vector", uvs)
+        holder.data.materials.append(material)
+    data = building.export()
+    assert data.warnings == ()
+
+    def moved(point: tuple[float, float]) -> tuple[float, float]:
+        """What Blender's manual says of the node."""
+        vector = Vector((*point, 0.0))
+        if kind == "TEXTURE":
+            vector = vector - location
+            vector.rotate(rotation.to_matrix().inverted())
+            return vector.x / scale.x, vector.y / scale.y
+        vector = vector * scale
+        vector.rotate(rotation)
+        return (vector + (location if kind == "POINT" else Vector()))[:2]
+
+    names = np.array([data.materials[index].name for index in data.geometry.material_index])
+    plain = data.geometry.corner_uvs[names == "Plain"].reshape(-1, 2)
+    assert {tuple(uv) for uv in plain.tolist()} == {(0, 0), (1, 0), (1, 1), (0, 1)}
+    expected = [moved(tuple(uv)) for uv in plain.tolist()]
+    np.testing.assert_allclose(data.geometry.corner_uvs[names == "M"].reshape(-1, 2), expected, atol=1e-5)
