@@ -22,7 +22,7 @@ help: ## List these commands
 demo: .venv/ready ## Trace a scene with every method and with Cycles: make demo [INPUT=file-or-scene-name]
 	$(BIN)/espalier compare "$(INPUT)" --resolution $(RESOLUTION) --cycles --out $(OUT)
 
-test: .venv/ready ## Run every test that needs no installed Blender
+test: .venv/ready $(ZIP) ## Run every test that needs no installed Blender
 	$(CARGO) test --workspace
 	$(BIN)/pytest tests/python
 	$(BIN)/pytest tests/headless
