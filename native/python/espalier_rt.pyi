@@ -3,7 +3,7 @@
 Arrays are numpy's. Each docstring of the module gives shapes, types, units and errors; help(espalier_rt) shows them.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Final, Literal, TypedDict, final, type_check_only
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 __all__ = [
     "MISS",
     "Accelerator",
+    "Camera",
     "Cancelled",
     "Cells",
     "ConfigError",
@@ -23,11 +24,14 @@ __all__ = [
     "MeshError",
     "OutOfMemory",
     "RayError",
+    "Render",
+    "Scene",
     "SceneError",
     "__version__",
     "default_config",
     "instruction_set",
     "methods",
+    "render",
 ]
 
 __version__: str
@@ -165,3 +169,79 @@ class Census(TypedDict):
     sah_cost: float
     phases: dict[str, float]
     build_ms: float
+
+@final
+class Scene:
+    def __new__(
+        cls,
+        mesh: Mesh,
+        *,
+        materials: Sequence[Mapping[str, Any]],
+        material_index: ArrayLike | None = None,
+        corner_normals: ArrayLike | None = None,
+        corner_uvs: ArrayLike | None = None,
+        textures: Sequence[Mapping[str, Any]] | None = None,
+        lights: Sequence[Mapping[str, Any]] | None = None,
+        world: tuple[float, float, float] = ...,
+    ) -> Scene: ...
+    @property
+    def mesh(self) -> Mesh: ...
+
+@final
+class Camera:
+    def __new__(
+        cls,
+        *,
+        kind: str,
+        matrix: ArrayLike,
+        resolution: tuple[int, int],
+        lens: float = 50.0,
+        sensor_width: float = 36.0,
+        sensor_height: float = 24.0,
+        sensor_fit: str = "auto",
+        shift: tuple[float, float] = ...,
+        ortho_scale: float = 6.0,
+        clip: tuple[float, float] = ...,
+        pixel_aspect: tuple[float, float] = ...,
+        border: tuple[float, float, float, float] | None = None,
+    ) -> Camera: ...
+    @property
+    def size(self) -> tuple[int, int]: ...
+    def rays(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]: ...
+
+@final
+class Render:
+    @property
+    def combined(self) -> NDArray[np.float32]: ...
+    @property
+    def depth(self) -> NDArray[np.float32]: ...
+    @property
+    def normal(self) -> NDArray[np.float32]: ...
+    @property
+    def cost(self) -> NDArray[np.float32] | None: ...
+    @property
+    def rays(self) -> int: ...
+    @property
+    def primary_rays(self) -> int: ...
+    @property
+    def shadow_rays(self) -> int: ...
+    @property
+    def bounce_rays(self) -> int: ...
+    @property
+    def trace_s(self) -> float: ...
+    @property
+    def total_s(self) -> float: ...
+
+def render(
+    accelerator: Accelerator,
+    scene: Scene,
+    camera: Camera,
+    *,
+    samples: int = 1,
+    seed: int = 0,
+    max_bounces: int = 4,
+    threads: int = 0,
+    cost: bool = False,
+    transparent: bool = False,
+    job: Job | None = None,
+) -> Render: ...

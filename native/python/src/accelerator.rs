@@ -21,14 +21,15 @@ use crate::{
 /// All queries take the same rays:
 ///
 /// origins, directions: (n, 3) float32, finite; a direction may have any length but zero.
-/// tmin, tmax: numbers or (n,) float32: the interval of interest, both ends included, in lengths of the direction.
+/// tmin, tmax: numbers or (n,) float32: the interval of interest, both ends included, in lengths of
+/// the direction; from 0 to infinity if left out.
 /// threads: 0 for all the machine has.
 /// job: to watch and cancel the query from another thread.
 ///
 /// Arrays are read in place by any strides that are not negative, so columns of other arrays and
-/// numpy.broadcast_to(origin, (n, 3)) cost no copy; other floats and integers of up to 16 bits are converted first. They
-/// must not be written to during the call, which lets other Python threads run. Results depend on the rays alone, not
-/// on the number of threads; among hits at equal t the triangle of least index is reported, by every method alike.
+/// numpy.broadcast_to(origin, (n, 3)) cost no copy; other floats and integers of up to 16 bits are converted first.
+/// They must not be written to during the call, which lets other Python threads run. Results depend on the rays alone,
+/// not on the number of threads; among hits at equal t the triangle of least index is reported, by every method alike.
 ///
 /// Queries raise RayError, which names the first ray at fault, ConfigError for a bad number of threads, Cancelled, and
 /// OutOfMemory.
@@ -162,9 +163,9 @@ impl Accelerator {
     ///
     /// method; triangles of the mesh; nodes (wide branches), leaves, grids; cells of all grids and empty_cells among
     /// them; references (triangles in leaves and cells, each as often as it occurs); bytes held without the mesh;
-    /// max_depth and depth_histogram (branches, leaves and grids at every depth, the root's first); sah_cost (what a line
-    /// through the scene's box costs, in visits of a wide node); phases (milliseconds of wall time by name) and build_ms
-    /// (of the whole build).
+    /// max_depth and depth_histogram (branches, leaves and grids at every depth, the root's first); sah_cost (what a
+    /// line through the scene's box costs, in visits of a wide node); phases (milliseconds of wall time by name) and
+    /// build_ms (of the whole build).
     fn census<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         guard(py, || census::to_dict(py, &self.accelerator, self.build_ms))
     }
@@ -199,9 +200,10 @@ impl Accelerator {
     /// methods. Read-only arrays by name:
     ///
     /// lower, upper (k, 3) float32: tight box. depth (k,) uint32: the root has 0. primitives (k,) uint32: triangles.
-    /// rays, hits (k,) uint32: sample rays traced and how many hit. spread (k,) float32: index of dispersion of the hits
-    /// over the strata. hit_threshold, spread_threshold (k,) float32: what they were compared with. cost_grid, cost_bvh
-    /// (k,) float32: expected nanoseconds. verdict (k,) uint8: 0 split on, 1 grid, 2 leaf. Numbers without use are nan.
+    /// rays, hits (k,) uint32: sample rays traced and how many hit. spread (k,) float32: index of dispersion of the
+    /// hits over the strata. hit_threshold, spread_threshold (k,) float32: what they were compared with. cost_grid,
+    /// cost_bvh (k,) float32: expected nanoseconds. verdict (k,) uint8: 0 split on, 1 grid, 2 leaf. Numbers without use
+    /// are nan.
     fn decisions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         guard(py, || decisions::to_dict(py, self.accelerator.decisions()))
     }
@@ -219,9 +221,7 @@ impl Accelerator {
     }
 
     fn counts(&self, rays: &core::Rays<'_>, threads: usize, job: &core::Job) -> Result<Vec<Counts>, Error> {
-        let mut counts = Vec::new();
-        let bytes = rays.len().saturating_mul(size_of::<Counts>());
-        counts.try_reserve_exact(rays.len()).map_err(|_| Error::OutOfMemory { what: "the rays' costs", bytes })?;
+        let mut counts = arrays::reserve(rays.len(), "the rays' costs")?;
         counts.resize(rays.len(), Counts::default());
         self.core().counted(rays, &mut counts, threads, job)?;
         Ok(counts)

@@ -5,10 +5,11 @@
 //! byte order, reversed or unaligned memory) and integers that float32 holds exactly (8 and 16 bits) is first copied to
 //! float32, rounded to nearest. Any other type raises, since the conversion may change values silently.
 
-use espalier_core::Column;
+use espalier_core::{Column, Error};
 use numpy::{
     Element, Ix1, Ix2, PyArray, PyArrayDescr, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn,
-    PyReadwriteArray, PyUntypedArray, PyUntypedArrayMethods, ndarray::Dimension,
+    PyReadwriteArray, PyUntypedArray, PyUntypedArrayMethods,
+    ndarray::{Dimension, IntoDimension},
 };
 use pyo3::{prelude::*, sync::PyOnceLock, types::PyDict};
 
@@ -16,15 +17,20 @@ use crate::errors::Kind;
 
 /// What an argument is called, and which exception speaks of it.
 #[derive(Debug, Clone, Copy)]
-pub struct Argument {
-    pub name: &'static str,
+pub struct Argument<'a> {
+    pub name: &'a str,
     pub error: Kind,
 }
 
-impl Argument {
+impl Argument<'_> {
     /// "origins must be ..., got ..."
     pub fn fault(self, py: Python<'_>, need: &str, got: &str) -> PyErr {
         self.error.error(py, format!("{} must be {need}; got {got}", self.name))
+    }
+
+    /// The array is borrowed for writing.
+    pub fn busy(self, py: Python<'_>) -> PyErr {
+        self.error.error(py, format!("{} is being written to by other native code: wait until it is done", self.name))
     }
 
     /// `value` as a numpy array: itself, or what numpy.asarray makes of it.
@@ -61,7 +67,7 @@ impl<'py> Rows<'py> {
     ///
     /// # Errors
     /// The argument's, for another shape, a type outside the rule above, or an array borrowed for writing.
-    pub fn table(value: &Bound<'py, PyAny>, columns: usize, argument: Argument) -> PyResult<Self> {
+    pub fn table(value: &Bound<'py, PyAny>, columns: usize, argument: Argument<'_>) -> PyResult<Self> {
         let need = format!("a float32 array of shape (n, {columns})");
         let array = argument.array(value, &need)?;
         if array.ndim() != 2 || array.shape()[1] != columns {
@@ -74,7 +80,7 @@ impl<'py> Rows<'py> {
     ///
     /// # Errors
     /// As [`Rows::table`].
-    pub fn list(array: Bound<'py, PyUntypedArray>, count: usize, argument: Argument) -> PyResult<Self> {
+    pub fn list(array: Bound<'py, PyUntypedArray>, count: usize, argument: Argument<'_>) -> PyResult<Self> {
         let need = format!("a number or a float32 array of shape ({count},)");
         if array.shape() != [count] {
             return Err(argument.fault(array.py(), &need, &describe(&array)));
@@ -82,13 +88,13 @@ impl<'py> Rows<'py> {
         Self::new(array, &need, argument)
     }
 
-    fn new(array: Bound<'py, PyUntypedArray>, need: &str, argument: Argument) -> PyResult<Self> {
+    fn new(array: Bound<'py, PyUntypedArray>, need: &str, argument: Argument<'_>) -> PyResult<Self> {
         let py = array.py();
         let array = as_float32(array, need, argument)?;
         let count = array.shape()[0];
         let [row_stride, column_stride] = strides(&array);
         let memory = if array.is_contiguous() { array } else { covering(&array)? };
-        let memory = memory.try_readonly().map_err(|_| argument.fault(py, need, "one that is being written to"))?;
+        let memory = memory.try_readonly().map_err(|_| argument.busy(py))?;
         Ok(Self { memory, count, row_stride, column_stride })
     }
 
@@ -109,11 +115,49 @@ impl<'py> Rows<'py> {
     }
 }
 
+/// Float32 numbers of any shape that follow each other, borrowed from numpy or, where they do not, from a copy.
+pub struct Dense<'py> {
+    memory: PyReadonlyArrayDyn<'py, f32>,
+}
+
+impl<'py> Dense<'py> {
+    /// Borrow an array of a shape in words, which `fits` knows.
+    ///
+    /// # Errors
+    /// As [`Rows::table`].
+    pub fn new(
+        value: &Bound<'py, PyAny>,
+        shape: &str,
+        fits: impl Fn(&[usize]) -> bool,
+        argument: Argument<'_>,
+    ) -> PyResult<Self> {
+        let (py, need) = (value.py(), format!("a float32 array of shape {shape}"));
+        let array = argument.array(value, &need)?;
+        if !fits(array.shape()) {
+            return Err(argument.fault(py, &need, &describe(&array)));
+        }
+        let array = as_float32(array, &need, argument)?;
+        let array = numpy_function(py, "ascontiguousarray")?.call1((array,))?.cast_into::<PyArrayDyn<f32>>()?;
+        let memory = array.try_readonly().map_err(|_| argument.busy(py))?;
+        Ok(Self { memory })
+    }
+
+    /// Its shape.
+    pub fn shape(&self) -> &[usize] {
+        self.memory.shape()
+    }
+
+    /// All numbers, the last axis fastest.
+    pub fn values(&self) -> &[f32] {
+        self.memory.as_slice().unwrap_or_default()
+    }
+}
+
 /// The array as aligned native float32 with strides that are whole and not negative: itself, or a copy by the rule.
 fn as_float32<'py>(
     array: Bound<'py, PyUntypedArray>,
     need: &str,
-    argument: Argument,
+    argument: Argument<'_>,
 ) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
     let py = array.py();
     let walkable = array.shape().iter().zip(array.strides()).all(|(&n, &s)| n < 2 || (s >= 0 && s % 4 == 0));
@@ -167,6 +211,15 @@ pub type List<T> = Py<PyArray<T, Ix1>>;
 /// An array of shape (n, columns), on its way out.
 pub type Table<T> = Py<PyArray<T, Ix2>>;
 
+/// A vector as an array of a shape, without a copy.
+pub fn shaped<D: Dimension>(
+    py: Python<'_>,
+    values: Vec<f32>,
+    shape: impl IntoDimension<Dim = D>,
+) -> PyResult<Py<PyArray<f32, D>>> {
+    Ok(PyArray::from_vec(py, values).reshape(shape)?.unbind())
+}
+
 /// A new read-only array of shape (n,).
 pub fn list<T: Element>(py: Python<'_>, values: impl ExactSizeIterator<Item = T> + Send) -> PyResult<List<T>> {
     let mut array = empty(py, values.len())?;
@@ -214,4 +267,30 @@ pub fn finished<T: Element, D: Dimension>(array: PyReadwriteArray<'_, T, D>) -> 
 
 fn numpy_function<'py>(py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
     py.import("numpy")?.getattr(name)
+}
+
+/// Groups of N numbers, each made into something, in a new vector.
+///
+/// # Errors
+/// [`Error::OutOfMemory`].
+pub fn grouped<T, const N: usize>(
+    values: &[f32],
+    what: &'static str,
+    make: impl Fn(&[f32; N]) -> T,
+) -> Result<Vec<T>, Error> {
+    let (groups, _) = values.as_chunks::<N>();
+    let mut made = reserve(groups.len(), what)?;
+    made.extend(groups.iter().map(make));
+    Ok(made)
+}
+
+/// A vector with room for `count` values.
+///
+/// # Errors
+/// [`Error::OutOfMemory`].
+pub fn reserve<T>(count: usize, what: &'static str) -> Result<Vec<T>, Error> {
+    let mut values = Vec::new();
+    let bytes = count.saturating_mul(size_of::<T>());
+    values.try_reserve_exact(count).map_err(|_| Error::OutOfMemory { what, bytes })?;
+    Ok(values)
 }

@@ -82,6 +82,18 @@ impl Kind {
     }
 }
 
+impl Kind {
+    /// The core's error of this kind, where the core has one about an argument.
+    pub fn core(self, message: String) -> Error {
+        match self {
+            Self::Mesh => Error::Mesh(message),
+            Self::Ray => Error::Ray(message),
+            Self::Config => Error::Config(message),
+            _ => Error::Scene(message),
+        }
+    }
+}
+
 /// The core's results as Python's.
 pub trait OrRaise<T> {
     /// The value, or the Python exception of the error.

@@ -1,4 +1,6 @@
-//! Triangles' vertex indices from numpy integers of any type.
+//! Indices from numpy integers of any type.
+
+use std::fmt::Debug;
 
 use espalier_core::Error;
 use numpy::{Element, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
@@ -9,96 +11,121 @@ use crate::{
     errors::Kind,
 };
 
-const ARGUMENT: Argument = Argument { name: "triangles", error: Kind::Mesh };
-const NEED: &str = "a uint32 array of shape (m, 3)";
+/// Rows of N indices, borrowed from numpy.
+pub struct Indices<'py, const N: usize> {
+    integers: Integers<'py>,
+    argument: Argument<'static>,
+}
 
-/// Vertex indices, borrowed from numpy. Types that are not here are copied to int64 first.
-pub enum Indices<'py> {
+/// The types that are read in place; all others are copied to int64 first.
+enum Integers<'py> {
     Unsigned(PyReadonlyArrayDyn<'py, u32>),
     Signed(PyReadonlyArrayDyn<'py, i32>),
     Long(PyReadonlyArrayDyn<'py, i64>),
     UnsignedLong(PyReadonlyArrayDyn<'py, u64>),
 }
 
-impl<'py> Indices<'py> {
-    /// Borrow an integer array of shape (m, 3), copied first where its rows do not follow each other.
+impl<'py, const N: usize> Indices<'py, N> {
+    /// Borrow integers of shape (n, N), or (n,) where N is 1, copied first where they do not follow each other.
     ///
     /// # Errors
-    /// MeshError for another shape or type.
-    pub fn new(value: &Bound<'py, PyAny>) -> PyResult<Self> {
-        let py = value.py();
-        let array = ARGUMENT.array(value, NEED)?;
-        if array.ndim() != 2 || array.shape()[1] != 3 || !matches!(array.dtype().kind(), b'i' | b'u') {
-            return Err(ARGUMENT.fault(py, NEED, &arrays::describe(&array)));
+    /// The argument's for another shape or type.
+    pub fn new(value: &Bound<'py, PyAny>, argument: Argument<'static>) -> PyResult<Self> {
+        let (py, need) = (value.py(), need(N));
+        let array = argument.array(value, &need)?;
+        let fits = if N == 1 { array.ndim() == 1 } else { array.ndim() == 2 && array.shape()[1] == N };
+        if !fits || !matches!(array.dtype().kind(), b'i' | b'u') {
+            return Err(argument.fault(py, &need, &arrays::describe(&array)));
         }
         let array = py.import("numpy")?.call_method1("ascontiguousarray", (array,))?;
-        if let Some(array) = borrow(&array)? {
+        Ok(Self { integers: Integers::borrow(&array, argument)?, argument })
+    }
+
+    /// The same without Python.
+    pub fn view(&self) -> View<'_, N> {
+        let integers = match &self.integers {
+            Integers::Unsigned(array) => Slice::Unsigned(array.as_slice().unwrap_or_default()),
+            Integers::Signed(array) => Slice::Signed(array.as_slice().unwrap_or_default()),
+            Integers::Long(array) => Slice::Long(array.as_slice().unwrap_or_default()),
+            Integers::UnsignedLong(array) => Slice::UnsignedLong(array.as_slice().unwrap_or_default()),
+        };
+        View { integers, argument: self.argument }
+    }
+}
+
+fn need(columns: usize) -> String {
+    if columns == 1 { "a uint32 array of shape (n,)".into() } else { format!("a uint32 array of shape (n, {columns})") }
+}
+
+impl<'py> Integers<'py> {
+    fn borrow(array: &Bound<'py, PyAny>, argument: Argument<'static>) -> PyResult<Self> {
+        if let Some(array) = borrow(array, argument)? {
             return Ok(Self::Unsigned(array));
         }
-        if let Some(array) = borrow(&array)? {
+        if let Some(array) = borrow(array, argument)? {
             return Ok(Self::Signed(array));
         }
-        if let Some(array) = borrow(&array)? {
+        if let Some(array) = borrow(array, argument)? {
             return Ok(Self::UnsignedLong(array));
         }
+        let py = array.py();
         let array = array.call_method1("astype", (numpy::dtype::<i64>(py),))?;
-        borrow(&array)?.map(Self::Long).ok_or_else(|| ARGUMENT.fault(py, NEED, "something else"))
-    }
-
-    /// The triangles.
-    pub fn view(&self) -> View<'_> {
-        match self {
-            Self::Unsigned(array) => View::Unsigned(array.as_slice().unwrap_or_default()),
-            Self::Signed(array) => View::Signed(array.as_slice().unwrap_or_default()),
-            Self::Long(array) => View::Long(array.as_slice().unwrap_or_default()),
-            Self::UnsignedLong(array) => View::UnsignedLong(array.as_slice().unwrap_or_default()),
-        }
+        let array = borrow(&array, argument)?;
+        array.map(Self::Long).ok_or_else(|| Kind::Internal.error(py, "numpy made no int64"))
     }
 }
 
-fn borrow<'py, T: Element>(array: &Bound<'py, PyAny>) -> PyResult<Option<PyReadonlyArrayDyn<'py, T>>> {
+fn borrow<'py, T: Element>(
+    array: &Bound<'py, PyAny>,
+    argument: Argument<'static>,
+) -> PyResult<Option<PyReadonlyArrayDyn<'py, T>>> {
     let Ok(array) = array.cast::<PyArrayDyn<T>>() else { return Ok(None) };
-    let borrowed = array.try_readonly();
-    borrowed.map(Some).map_err(|_| ARGUMENT.fault(array.py(), NEED, "one that is being written to"))
+    array.try_readonly().map(Some).map_err(|_| argument.busy(array.py()))
 }
 
-/// [`Indices`] without Python.
-pub enum View<'a> {
+/// Rows of N indices.
+pub struct View<'a, const N: usize> {
+    integers: Slice<'a>,
+    argument: Argument<'static>,
+}
+
+enum Slice<'a> {
     Unsigned(&'a [u32]),
     Signed(&'a [i32]),
     Long(&'a [i64]),
     UnsignedLong(&'a [u64]),
 }
 
-impl View<'_> {
-    /// The triangles, copied.
+impl<const N: usize> View<'_, N> {
+    /// The rows, copied.
     ///
     /// # Errors
-    /// [`Error::Mesh`] for an index below zero or beyond 32 bits; [`Error::OutOfMemory`].
-    pub fn triangles(&self) -> Result<Vec<[u32; 3]>, Error> {
-        match self {
-            Self::Unsigned(values) => triangles(values),
-            Self::Signed(values) => triangles(values),
-            Self::Long(values) => triangles(values),
-            Self::UnsignedLong(values) => triangles(values),
+    /// The argument's for an index below zero or beyond 32 bits; [`Error::OutOfMemory`].
+    pub fn rows(&self) -> Result<Vec<[u32; N]>, Error> {
+        match self.integers {
+            Slice::Unsigned(values) => rows(values, self.argument),
+            Slice::Signed(values) => rows(values, self.argument),
+            Slice::Long(values) => rows(values, self.argument),
+            Slice::UnsignedLong(values) => rows(values, self.argument),
         }
     }
 }
 
-fn triangles<T: Copy + TryInto<u32> + std::fmt::Display>(values: &[T]) -> Result<Vec<[u32; 3]>, Error> {
-    let (corners, _) = values.as_chunks::<3>();
-    let mut triangles = Vec::new();
-    let bytes = size_of_val(corners) * size_of::<u32>() / size_of::<T>();
-    triangles
-        .try_reserve_exact(corners.len())
-        .map_err(|_| Error::OutOfMemory { what: "the list of triangles", bytes })?;
-    for (index, &triangle) in corners.iter().enumerate() {
-        let [Ok(a), Ok(b), Ok(c)] = triangle.map(T::try_into) else { return Err(fault(index, triangle)) };
-        triangles.push([a, b, c]);
+fn rows<T: Copy + TryInto<u32> + Debug, const N: usize>(
+    values: &[T],
+    argument: Argument<'static>,
+) -> Result<Vec<[u32; N]>, Error> {
+    let (given, _) = values.as_chunks::<N>();
+    let mut rows = arrays::reserve(given.len(), argument.name)?;
+    for (index, row) in given.iter().enumerate() {
+        let mut indices = [0; N];
+        for (slot, value) in indices.iter_mut().zip(row) {
+            *slot = (*value).try_into().map_err(|_| {
+                let message = format!("{}[{index}] is {row:?}; indices must be from 0 to {}", argument.name, u32::MAX);
+                argument.error.core(message)
+            })?;
+        }
+        rows.push(indices);
     }
-    Ok(triangles)
-}
-
-fn fault<T: std::fmt::Display>(index: usize, [a, b, c]: [T; 3]) -> Error {
-    Error::Mesh(format!("triangle {index} has vertex indices [{a}, {b}, {c}]; they must be from 0 to 2^32 - 1"))
+    Ok(rows)
 }

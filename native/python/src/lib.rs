@@ -4,17 +4,23 @@
 
 mod accelerator;
 mod arrays;
+mod camera;
 mod cells;
 mod census;
 mod config;
 mod decisions;
 mod errors;
+mod fields;
 mod functions;
 mod hits;
 mod indices;
 mod job;
+mod light;
+mod material;
 mod mesh;
 mod rays;
+mod render;
+mod scene;
 
 use pyo3::prelude::*;
 
@@ -24,11 +30,14 @@ mod espalier_rt {
     #[pymodule_export]
     use crate::{
         accelerator::Accelerator,
+        camera::Camera,
         cells::Cells,
         functions::{default_config, instruction_set, methods},
         hits::Hits,
         job::Job,
         mesh::Mesh,
+        render::{Render, render},
+        scene::Scene,
     };
 
     use pyo3::prelude::*;

@@ -14,8 +14,8 @@ use crate::{
 
 /// A triangle mesh, checked and copied once; immutable, and safe to share between threads.
 ///
-/// vertices: (n, 3) float32, finite. Read in place by any strides that are not negative; other floats and integers of up
-/// to 16 bits are converted.
+/// vertices: (n, 3) float32, finite. Read in place by any strides that are not negative; other floats and integers of
+/// up to 16 bits are converted.
 /// triangles: (m, 3) uint32, each below n. Other integers that are not negative are converted.
 ///
 /// The arrays must not be written to during the call. Triangles of exactly zero area stay in the numbering and are
@@ -39,9 +39,9 @@ impl Mesh {
         let py = vertices.py();
         guard(py, || {
             let vertices = Rows::table(vertices, 3, Argument { name: "vertices", error: Kind::Mesh })?;
-            let triangles = Indices::new(triangles)?;
+            let triangles = Indices::<3>::new(triangles, Argument { name: "triangles", error: Kind::Mesh })?;
             let (columns, count, view) = (vertices.columns(), vertices.len(), triangles.view());
-            let mesh = py.detach(|| espalier_core::Mesh::new(points(columns, count)?, view.triangles()?));
+            let mesh = py.detach(|| espalier_core::Mesh::new(points(columns, count)?, view.rows()?));
             Ok(Self(Arc::new(mesh.or_raise(py)?)))
         })
     }
@@ -81,9 +81,7 @@ impl Mesh {
 
 /// Points from their coordinates.
 fn points(columns: [Column<'_>; 3], count: usize) -> Result<Vec<Vec3>, Error> {
-    let mut points = Vec::new();
-    let bytes = count.saturating_mul(size_of::<Vec3>());
-    points.try_reserve_exact(count).map_err(|_| Error::OutOfMemory { what: "the list of vertices", bytes })?;
+    let mut points = arrays::reserve(count, "the list of vertices")?;
     points.extend((0..count).map(|index| Vec3::from_array(columns.map(|column| column.get(index)))));
     Ok(points)
 }

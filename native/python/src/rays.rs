@@ -66,7 +66,7 @@ impl<'py> RayArrays<'py> {
     }
 }
 
-fn argument(name: &'static str) -> Argument {
+fn argument(name: &str) -> Argument<'_> {
     Argument { name, error: Kind::Ray }
 }
 
@@ -77,7 +77,7 @@ enum Limit<'py> {
 }
 
 impl<'py> Limit<'py> {
-    fn new(given: &Given<'py>, default: f32, count: usize, argument: Argument) -> PyResult<Self> {
+    fn new(given: &Given<'py>, default: f32, count: usize, argument: Argument<'_>) -> PyResult<Self> {
         let Some(value) = &given.0 else { return Ok(Self::One(default)) };
         if let Ok(number) = value.extract::<f64>() {
             return Ok(Self::One(number as f32));

@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use glam::{Vec2, Vec3};
-use rayon::prelude::*;
 
 use super::{
     light::{Emitter, Light},
@@ -115,7 +114,7 @@ fn check_indices(settings: &SceneSettings) -> Result<(), Error> {
         return Err(Error::Scene("a scene needs at least one material".into()));
     }
     let indices = settings.material_index.as_deref().unwrap_or(&[]);
-    if let Some(triangle) = indices.par_iter().position_first(|&index| index as usize >= materials) {
+    if let Some(triangle) = indices.iter().position(|&index| index as usize >= materials) {
         let index = indices[triangle];
         return Err(Error::Scene(format!(
             "triangle {triangle} has material {index}, but there are only {materials}: indices must be less than that"
@@ -143,8 +142,8 @@ fn check_values(settings: &SceneSettings) -> Result<(), Error> {
     check_corners(settings.corner_uvs.as_deref(), "corner_uvs", Vec2::is_finite)
 }
 
-fn check_corners<T: Copy + Sync>(corners: Option<&[[T; 3]]>, name: &str, good: fn(T) -> bool) -> Result<(), Error> {
-    let fault = corners.and_then(|all| all.par_iter().position_first(|three| !three.iter().all(|&value| good(value))));
+fn check_corners<T: Copy>(corners: Option<&[[T; 3]]>, name: &str, good: fn(T) -> bool) -> Result<(), Error> {
+    let fault = corners.and_then(|all| all.iter().position(|three| !three.iter().all(|&value| good(value))));
     fault.map_or(Ok(()), |triangle| {
         Err(Error::Scene(format!("{name} of triangle {triangle} are not finite: mend them or leave them out")))
     })
