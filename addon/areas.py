@@ -4,6 +4,9 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+MARK = "espalier"
+"""Custom property of the images made here."""
+
 
 def redraw(kinds: frozenset[str]) -> None:
     """Have every area of the given types, in every window, drawn again. Does nothing where there is no window."""
@@ -14,20 +17,39 @@ def redraw(kinds: frozenset[str]) -> None:
 
 
 def store_image(name: str, pixels: NDArray[np.float32]) -> bpy.types.Image:
-    """Put pixels (h, w, 4), scene-linear, rows bottom-up, into the image datablock `name`, made where it is missing.
+    """Put pixels (h, w, 4), scene-linear, rows bottom-up, into the image datablock `name`, shown as a render is."""
+    return _store(name, pixels, is_float=True)
 
-    An image of that name which is a file or a render result of the user's is left alone: ours is then `name.001`.
+
+def store_picture(name: str, picture: NDArray[np.uint8]) -> bpy.types.Image:
+    """Put a picture (h, w, 3), sRGB as the screen shows it, rows bottom-up, into the image datablock `name`.
+
+    Eight bits a channel: the picture has no more, and the view transform is in it already.
     """
+    height, width = picture.shape[:2]
+    rgba = np.ones((height, width, 4), np.float32)
+    rgba[..., :3] = picture / np.float32(255)
+    return _store(name, rgba, is_float=False)
+
+
+def _store(name: str, pixels: NDArray[np.float32], *, is_float: bool) -> bpy.types.Image:
     height, width = pixels.shape[:2]
-    image = bpy.data.images.get(name)
-    if image is None or image.source != "GENERATED":
-        image = bpy.data.images.new(name, width, height, alpha=True, float_buffer=True)
-        image.use_view_as_render = True
+    image = _own_image(name)
+    if image is None or image.is_float != is_float:
+        image = bpy.data.images.new(name, width, height, alpha=True, float_buffer=is_float)
+        image[MARK] = name
     elif tuple(image.size) != (width, height):
         image.scale(width, height)
+    image.use_view_as_render = is_float
     image.pixels.foreach_set(np.ascontiguousarray(pixels, dtype=np.float32).reshape(-1))
     image.update()
     return image
+
+
+def _own_image(name: str) -> bpy.types.Image | None:
+    """The image made here under this name. One that the user gave another name to, or made himself, is his."""
+    images = (image for image in bpy.data.images if image.get(MARK) == name)
+    return next((image for image in images if image.source == "GENERATED" and image.name.startswith(name)), None)
 
 
 def show_image(image: bpy.types.Image) -> None:

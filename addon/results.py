@@ -6,6 +6,7 @@ Tables are held beside the file, not in it: in scene properties, the user's next
 from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple
 
+from .report import CyclesSummary
 from .run import MethodResult, Run
 
 CYCLES = "cycles"
@@ -25,7 +26,14 @@ class Row(NamedTuple):
     cells: int | None = None
 
 
-_tables: dict[int, tuple[Row, ...]] = {}
+class Table(NamedTuple):
+    """The rows of a scene's last run, and what there is to say of it, one line each."""
+
+    rows: tuple[Row, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+_tables: dict[int, Table] = {}
 """By the scene's session_uid."""
 
 
@@ -44,6 +52,11 @@ def row(result: MethodResult) -> Row:
     )
 
 
+def cycles_row(cycles: CyclesSummary) -> Row:
+    """The numbers of Cycles, which has fewer."""
+    return Row(CYCLES, build_ms=cycles.sync_s * 1000, trace_s=cycles.render_s)
+
+
 def rows(run: Run) -> Iterator[Row]:
     """The numbers of a run's finished methods, then a row for each that is to come unless the run has ended."""
     finished = run.results
@@ -52,14 +65,14 @@ def rows(run: Run) -> Iterator[Row]:
         yield from map(Row, run.method_names[len(finished) :])
 
 
-def store(scene_uid: int, table: Iterable[Row]) -> None:
-    """Make these rows the table of a scene."""
-    _tables[scene_uid] = tuple(table)
+def store(scene_uid: int, table: Iterable[Row], notes: Iterable[str]) -> None:
+    """Make these rows and notes the table of a scene."""
+    _tables[scene_uid] = Table(tuple(table), tuple(notes))
 
 
-def of(scene_uid: int) -> tuple[Row, ...]:
+def of(scene_uid: int) -> Table:
     """The table of a scene; empty where nothing was run."""
-    return _tables.get(scene_uid, ())
+    return _tables.get(scene_uid, Table())
 
 
 def drop(scene_uid: int) -> None:

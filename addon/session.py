@@ -13,7 +13,7 @@ from .errors import BusyError
 from .run import MethodResult, Options, Run
 from .scene_data import SceneData
 
-__all__ = ["MethodResult", "Options", "Run", "Session", "clear", "drop", "of", "start"]
+__all__ = ["MethodResult", "Options", "Run", "Session", "adopt", "clear", "drop", "of", "start"]
 
 CANCEL_SECONDS = 1.0
 """How long to wait for a cancelled thread when its handles are dropped; it ends within 0.2 s."""
@@ -50,14 +50,18 @@ def start(scene: bpy.types.Scene, data: SceneData, method_names: Sequence[str], 
 
     Raises BusyError while the scene's last run works, and NativeModuleMissingError.
     """
-    global _revision
     last = of(scene)
     if last is not None and last.busy:
         raise BusyError(scene.name)
     _sessions.pop(scene.session_uid, None)
-    run = Run(data, method_names, options)
+    return adopt(scene, Run(data, method_names, options).start())
+
+
+def adopt(scene: bpy.types.Scene, run: Run) -> Session:
+    """Make a run that another task drives, such as a comparison, the scene's session."""
+    global _revision
     _revision += 1
-    session = Session(run.start(), _revision)
+    session = Session(run, _revision)
     _sessions[scene.session_uid] = session
     return session
 

@@ -19,10 +19,7 @@ and show times, image and cells"""
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        reason = reasons.no_trace(context)
-        if reason is not None:
-            cls.poll_message_set(reason)
-        return reason is None
+        return reasons.can_trace(cls, context)
 
     def begin(self, context: bpy.types.Context) -> Task:
         scene = context.scene
@@ -30,12 +27,12 @@ and show times, image and cells"""
         data = capture.export_frame(scene, context.view_layer)
         chosen = [name for name in methods.METHOD_NAMES if name in settings.methods]
         self._session = session.start(scene, data, chosen, session.Options.of(settings))
-        self._scene_uid = scene.session_uid
         self._shown_method = settings.method
         return self._session.run
 
     def advance(self, _context: bpy.types.Context) -> None:
-        results.store(self._scene_uid, results.rows(self._session.run))
+        run = self._session.run
+        results.store(self._scene_uid, results.rows(run), run.data.warnings)
 
     def finish(self, _context: bpy.types.Context) -> str:
         finished = self._session.run.results

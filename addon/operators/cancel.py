@@ -1,5 +1,7 @@
 """Cancel what runs."""
 
+from typing import ClassVar
+
 import bpy
 
 from . import task
@@ -10,6 +12,7 @@ class ESPALIER_OT_cancel(bpy.types.Operator):
 
     bl_idname = "espalier.cancel"
     bl_label = "Cancel"
+    bl_options: ClassVar[set[str]] = {"INTERNAL"}
 
     @classmethod
     def poll(cls, _context: bpy.types.Context) -> bool:

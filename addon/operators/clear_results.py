@@ -17,7 +17,7 @@ class ESPALIER_OT_clear_results(bpy.types.Operator):
         if task.current() is not None:
             cls.poll_message_set("Espalier is at work: wait for it, or press Esc to cancel it")
             return False
-        if not results.of(context.scene.session_uid):
+        if not results.of(context.scene.session_uid).rows:
             cls.poll_message_set("There are no results")
             return False
         return True

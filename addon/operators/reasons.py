@@ -38,6 +38,14 @@ def no_trace(context: bpy.types.Context) -> str | None:
     return missing_native()
 
 
+def can_trace(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+    """The poll of operators that trace, with its message."""
+    reason = no_trace(context)
+    if reason is not None:
+        operator.poll_message_set(reason)
+    return reason is None
+
+
 def may_have_triangles(ob: bpy.types.Object) -> bool:
     """Whether an object or the instances of it can have triangles in a render; the export knows for sure."""
     return not ob.hide_render and (ob.type in GEOMETRY or ob.instance_type != "NONE")

@@ -5,7 +5,7 @@ from typing import Any, ClassVar, Protocol
 
 import bpy
 
-from .. import native
+from .. import native, results
 from ..areas import redraw
 from ..errors import EspalierAddonError
 
@@ -63,6 +63,7 @@ class TaskOperator:
     finish: Callable[[bpy.types.Context], str]
 
     _task: Task
+    _scene_uid: int
     _timer: Any = None
     bl_options: ClassVar[set[str]] = set()
 
@@ -83,6 +84,13 @@ class TaskOperator:
         return {"RUNNING_MODAL"}
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        try:
+            return self._look(context, event)
+        except BaseException:
+            self.cancel(context)
+            raise
+
+    def _look(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if event.type == "ESC" and event.value == "PRESS":
             self._task.cancel()
             return {"RUNNING_MODAL"}
@@ -107,6 +115,7 @@ class TaskOperator:
         if window is not None:
             window.cursor_set("WAIT")
         try:
+            self._scene_uid = context.scene.session_uid
             self._task = _current = self.begin(context)
         except expected_errors() as error:
             self.report({"ERROR"}, str(error))
@@ -126,10 +135,13 @@ class TaskOperator:
             return {"CANCELLED"}
         try:
             self._task.raise_error()
-            self.report({"INFO"}, self.finish(context))
+            message = self.finish(context)
         except expected_errors() as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
+        for note in results.of(self._scene_uid).notes:
+            self.report({"WARNING"}, note)
+        self.report({"INFO"}, message)
         return {"FINISHED"}
 
     def _release(self, context: bpy.types.Context) -> None:

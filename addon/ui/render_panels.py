@@ -31,7 +31,6 @@ class ESPALIER_PT_trace(EspalierEngine, bpy.types.Panel):
     """Settings, buttons and progress."""
 
     bl_label = "Espalier"
-    bl_order = -1  # above the panels that Blender shows for every engine
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout

@@ -1,16 +1,23 @@
 """Parts of panels, drawn alike wherever they appear: run, settings, results, overlay."""
 
+import textwrap
 from collections.abc import Sequence
 from typing import Any
 
 import bpy
 
-from .. import overlay, results, session
+from .. import overlay, results
 from .. import results_table as table
 from ..operators import task
 
 WIDE = 520
 """Pixels, at a scale of 1, from which all columns of the results fit side by side."""
+
+MOST_NOTES = 6
+"""Most notes shown in a panel."""
+
+NOTE_MARGIN, LETTER = 75, 5.8
+"""Pixels at a scale of 1: around a note with its icon, and of a letter on average in Blender's font."""
 
 BEST = "\N{BLACK STAR}"
 """Marks the best of a column."""
@@ -23,21 +30,31 @@ def draw_run(layout: Layout, context: bpy.types.Context) -> None:
     column = layout.column()
     column.scale_y = 1.25
     column.operator("espalier.build_trace", icon="RENDER_STILL")
+    column.operator("espalier.compare", icon="IMAGE_RGB")
     current = task.current()
     if current is not None:
         row = layout.row(align=True)
         row.progress(factor=current.progress, text=current.status)
         row.operator("espalier.cancel", text="", icon="X")
-    draw_warnings(layout, session.of(context.scene))
+    draw_notes(layout, results.of(context.scene.session_uid).notes, panel_width(context))
 
 
-def draw_warnings(layout: Layout, current: session.Session | None) -> None:
-    """What the export left out or approximated, one line each."""
-    if current is None or not current.run.data.warnings:
+def panel_width(context: bpy.types.Context) -> float:
+    """Width of the region in pixels at a scale of 1."""
+    return context.region.width / context.preferences.system.ui_scale
+
+
+def draw_notes(layout: Layout, notes: Sequence[str], width: float) -> None:
+    """What the last run left out or approximated, wrapped to the panel."""
+    if not notes:
         return
     box = layout.box().column(align=True)
-    for index, warning in enumerate(current.run.data.warnings):
-        box.label(text=warning, icon="ERROR" if index == 0 else "BLANK1")
+    for note in notes[:MOST_NOTES]:
+        lines = textwrap.wrap(note, max(int((width - NOTE_MARGIN) / LETTER), 16))
+        for index, line in enumerate(lines):
+            box.label(text=line, icon="BLANK1" if index else "ERROR")
+    if len(notes) > MOST_NOTES:
+        box.label(text=f"{len(notes) - MOST_NOTES} more in the Info editor", icon="BLANK1")
 
 
 def draw_methods(layout: Layout, settings: Any) -> None:
@@ -60,12 +77,11 @@ def draw_advanced(layout: Layout, settings: Any) -> None:
 
 def draw_results(layout: Layout, context: bpy.types.Context) -> None:
     """The table: all columns side by side in a wide panel, times above sizes in a narrow one."""
-    rows = results.of(context.scene.session_uid)
+    rows = results.of(context.scene.session_uid).rows
     if not rows:
         layout.label(text="Nothing traced yet")
         return
-    width = context.region.width / context.preferences.system.ui_scale
-    if width >= WIDE:
+    if panel_width(context) >= WIDE:
         _draw_table(layout, rows, table.TIMES + table.SIZES, short=False)
     else:
         _draw_table(layout, rows, table.TIMES, short=True)
