@@ -7,10 +7,8 @@ import bpy
 import numpy as np
 
 from . import capture, native
-from .errors import EspalierAddonError
 from .export import export_scene
 from .run import MethodResult, Options, Run
-from .scene_data import Float32
 
 POLL_SECONDS = 0.02
 """How often a render looks for Esc and tells its progress."""
@@ -38,11 +36,10 @@ class ESPALIER_RenderEngine(bpy.types.RenderEngine):
         try:
             if not capture.taken(depsgraph):
                 self._render(depsgraph)
-        except EspalierAddonError as error:
+        except native.expected_errors() as error:
             self._fail(str(error))
         except Exception as error:  # noqa: BLE001 - told to Blender, whose render it ends
-            if not _is_native(error):
-                traceback.print_exc()
+            traceback.print_exc()
             self._fail(f"{type(error).__name__}: {error}")
 
     def _render(self, depsgraph: Any) -> None:
@@ -52,12 +49,13 @@ class ESPALIER_RenderEngine(bpy.types.RenderEngine):
         data = export_scene(depsgraph)
         for warning in data.warnings:
             self.report({"WARNING"}, warning)
-        run = Run(data, [settings.method], Options.of(settings, cost=settings.cost_pass)).start()
+        options = Options.of(settings, cost=settings.cost_pass, transparent=scene.render.film_transparent)
+        run = Run(data, [settings.method], options).start()
         del data
         self._watch(run)
         run.raise_error()
         if not run.cancelled:
-            self._hand_over(run.results[0], depsgraph.view_layer.name, scene.render.film_transparent)
+            self._hand_over(run.results[0], depsgraph.view_layer.name)
 
     def _fail(self, message: str) -> None:
         """Tell an error where people look: the report raises in scripts, the other stands above the image."""
@@ -69,14 +67,18 @@ class ESPALIER_RenderEngine(bpy.types.RenderEngine):
         while not run.wait(POLL_SECONDS):
             self.update_progress(run.progress)
             self.update_stats("", f"Espalier: {run.status}")
-            if self.test_break():
+            if self._stopped():
                 run.cancel()
 
-    def _hand_over(self, result: MethodResult, view_layer: str, transparent: bool) -> None:
+    def _stopped(self) -> bool:
+        """True once the user pressed Esc, or closed the render."""
+        return self.test_break()
+
+    def _hand_over(self, result: MethodResult, view_layer: str) -> None:
         """Fill Blender's passes."""
         render = result.render
         height, width = render.depth.shape
-        passes = {"Combined": _film(render.combined, transparent), "Depth": render.depth, "Normal": render.normal}
+        passes = {"Combined": render.combined, "Depth": render.depth, "Normal": render.normal}
         if render.cost is not None:
             passes["Cost"] = render.cost
         blender_result: Any = self.begin_result(0, 0, width, height, layer=view_layer)
@@ -86,19 +88,6 @@ class ESPALIER_RenderEngine(bpy.types.RenderEngine):
                     layer_pass.rect.foreach_set(np.ascontiguousarray(passes[layer_pass.name]).reshape(-1))
         finally:
             self.end_result(blender_result)
-
-
-def _film(combined: Float32, transparent: bool) -> Float32:
-    """The image with its alpha; an opaque film covers every pixel."""
-    if transparent:
-        return combined
-    opaque = combined.copy()
-    opaque[..., 3] = 1.0
-    return opaque
-
-
-def _is_native(error: Exception) -> bool:
-    return isinstance(error, native.module().EspalierError)
 
 
 def register() -> None:

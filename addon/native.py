@@ -3,7 +3,7 @@
 from types import ModuleType
 from typing import Any, NamedTuple
 
-from .errors import NativeModuleMissingError
+from .errors import EspalierAddonError, NativeModuleMissingError
 from .scene_data import SceneData
 
 
@@ -22,6 +22,14 @@ def module() -> ModuleType:
     except ImportError as error:
         raise NativeModuleMissingError(str(error)) from error
     return espalier_rt
+
+
+def expected_errors() -> tuple[type[Exception], ...]:
+    """The errors whose message tells the user what to do; any other is a bug, and keeps its traceback."""
+    try:
+        return (EspalierAddonError, module().EspalierError)
+    except NativeModuleMissingError:
+        return (EspalierAddonError,)
 
 
 def handles(data: SceneData) -> Handles:

@@ -15,7 +15,10 @@ from .scene_data import SceneData
 
 @dataclass(frozen=True)
 class Options:
-    """How to trace. threads 0: all cores. expected_rays 0: the rays of one frame, pixels times samples."""
+    """How to trace. threads 0: all cores. expected_rays 0: the rays of one frame, pixels times samples.
+
+    cost: also count the traversal steps of every pixel. transparent: leave the world out of the picture.
+    """
 
     samples: int = 1
     threads: int = 0
@@ -23,9 +26,10 @@ class Options:
     seed: int = 0
     max_bounces: int = 4
     cost: bool = False
+    transparent: bool = False
 
     @classmethod
-    def of(cls, settings: Any, *, cost: bool = False) -> "Options":
+    def of(cls, settings: Any, *, cost: bool = False, transparent: bool = False) -> "Options":
         """Options from the property group `scene.espalier`, whose expected rays are in millions."""
         return cls(
             samples=settings.samples,
@@ -34,6 +38,7 @@ class Options:
             seed=settings.seed,
             max_bounces=settings.max_bounces,
             cost=cost,
+            transparent=transparent,
         )
 
 
@@ -157,6 +162,7 @@ class Run:
             max_bounces=options.max_bounces,
             threads=options.threads,
             cost=options.cost,
+            transparent=options.transparent,
             job=self._job,
         )
         return MethodResult(name, accelerator, accelerator.census(), render)

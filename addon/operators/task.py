@@ -5,9 +5,9 @@ from typing import Any, ClassVar, Protocol
 
 import bpy
 
-from .. import native, results
+from .. import results
 from ..areas import redraw
-from ..errors import EspalierAddonError
+from ..native import expected_errors
 
 TICK_SECONDS = 0.05
 """How often progress is looked at; the core polls for a cancel as often, so Esc is obeyed within 0.2 s."""
@@ -38,14 +38,6 @@ _current: Task | None = None
 def current() -> Task | None:
     """The task under way, or None."""
     return _current
-
-
-def expected_errors() -> tuple[type[Exception], ...]:
-    """The errors whose message tells the user what to do; any other is a bug, and keeps its traceback."""
-    try:
-        return (EspalierAddonError, native.module().EspalierError)
-    except EspalierAddonError:
-        return (EspalierAddonError,)
 
 
 class TaskOperator:
