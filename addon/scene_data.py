@@ -53,8 +53,8 @@ class MaterialData(_Arguments):
 class LightData(_Arguments):
     """A light in Blender's units; `matrix` is light to world, and it shines along its local -Z.
 
-    power: watts (sun: watts per square metre), exposure already applied. radius: metres (point, spot).
-    angle: radians (sun). spot_size: radians of the full cone. size, size_y: metres (area), scaled by the matrix.
+    power: watts (sun: watts per square metre), exposure already applied. radius: metres (point, spot), of a disk that
+    faces the lit point where soft_falloff, else of a sphere. angle: radians (sun). spot_size: radians of the full cone. size, size_y: metres (area), scaled by the matrix.
     spread: radians (area).
     """
 
@@ -64,6 +64,7 @@ class LightData(_Arguments):
     color: Color = (1.0, 1.0, 1.0)
     power: float = 10.0
     radius: float = 0.0
+    soft_falloff: bool = True
     angle: float = 0.0
     spot_size: float = float(np.pi / 4)
     spot_blend: float = 0.15

@@ -31,11 +31,11 @@ def read_light(light: Light, matrix: Any, name: str, notes: Notes) -> LightData:
 
 
 def _sphere(light: Light) -> dict[str, Any]:
-    return {"radius": light.shadow_soft_size}
+    return {"radius": light.shadow_soft_size, "soft_falloff": light.use_soft_falloff}
 
 
 def _spot(light: Light) -> dict[str, Any]:
-    return {"radius": light.shadow_soft_size, "spot_size": light.spot_size, "spot_blend": light.spot_blend}
+    return {**_sphere(light), "spot_size": light.spot_size, "spot_blend": light.spot_blend}
 
 
 def _sun(light: Light) -> dict[str, Any]:

@@ -44,6 +44,34 @@ fn a_surface_inside_a_sphere_light_sees_its_radiance_all_around() {
     near(value, 100.0 / (4.0 * PI * PI * 4.0), 1e-3);
 }
 
+/// Cycles' rule: 4 π r², and 4 without a radius.
+#[test]
+fn points_that_are_not_normalised_shine_by_their_surface() {
+    for (radius, surface) in [(0.0, 4.0), (0.5, PI)] {
+        let kind = LightKind::Point { bulb: Bulb { radius, soft_falloff: false } };
+        let mut lamp = light(kind, Mat4::from_translation(Vec3::Z * 2.0), 100.0);
+        lamp.normalize = false;
+        near(on_floor(lamp, 0.0, 256), surface * 100.0 / (4.0 * PI) / 4.0 / PI, 2e-3);
+    }
+}
+
+/// Every point under a wide light with a narrow spread sees its beam straight above, with little noise.
+#[test]
+fn narrow_spreads_are_beams() {
+    for (round, surface) in [(false, 4.0), (true, PI)] {
+        let lamp = area(round, [2.0, 2.0], 0.02, 2.0, 100.0);
+        for x in [0.0, 0.5, 0.95] {
+            near(on_floor(lamp.clone(), x, 256), 100.0 / surface / PI, 1e-2);
+        }
+        assert_eq!(on_floor(lamp, 1.05, 64), 0.0);
+    }
+}
+
+#[test]
+fn an_area_without_surface_is_dark() {
+    assert_eq!(on_floor(area(false, [0.0, 1.0], 3.0, 2.0, 100.0), 0.0, 16), 0.0);
+}
+
 #[test]
 fn a_sun_gives_its_irradiance_whatever_its_angle() {
     for angle in [0.0, 0.01, 0.5, 2.0] {
@@ -96,11 +124,11 @@ fn rectangle_factor(a: f64, b: f64, h: f64) -> f64 {
 fn area_lights_light_by_their_form_factor() {
     let (power, pi) = (100.0, std::f32::consts::PI);
     for (size, height) in [([1.0, 1.0], 2.0), ([3.0, 0.5], 1.0), ([2.0, 2.0], 0.5)] {
-        let radiance = f64::from(power) / (4.0 * f64::from(size[0] * size[1]));
+        let radiance = f64::from(power) / (PI * f64::from(size[0] * size[1]));
         let factor = rectangle_factor(f64::from(size[0]), f64::from(size[1]), f64::from(height));
         near(on_floor(area(false, size, pi, height, power), 0.0, 1 << 14), radiance * factor, 5e-3);
     }
-    let disk = f64::from(power) / (4.0 * PI * 0.25) * (0.25 / (0.25 + 4.0));
+    let disk = f64::from(power) / (PI * PI * 0.25) * (0.25 / (0.25 + 4.0));
     near(on_floor(area(true, [1.0, 1.0], pi, 2.0, power), 0.0, 1 << 14), disk, 5e-3);
 }
 
@@ -130,7 +158,7 @@ fn spread_keeps_the_power_and_bounds_the_angle() {
             value * PI * PI * (outer * outer - inner * inner)
         })
         .sum();
-    near(flux, 100.0 * PI / 4.0, 1e-2);
+    near(flux, 100.0, 1e-2);
 }
 
 #[test]

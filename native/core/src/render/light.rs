@@ -1,14 +1,15 @@
 //! Lights in Blender's units, and how they are sampled.
 //!
-//! A light of P watts, normalised, has these strengths, which are those of Cycles:
+//! A light of P watts, normalised, has these strengths, which are those of Cycles (measured against it in the tests):
 //! * point and spot: intensity P / (4π) W/sr. With a radius they are a disk that faces the lit point (soft falloff) or a
 //!   sphere, of radiance P / (4π² r²).
 //! * sun: P W/m² on a surface that faces it, from a cone of the given angle.
-//! * area: radiance P / (4 A) over an area A, on the front only (the physical P / (π A) is brighter; Blender's lights
-//!   have been so since before they were physical). A spread below 180° puts a grid in front of it that hides light
-//!   from the side and leaves the whole power unchanged.
+//! * area: radiance P / (π A) over an area A, on the front only. A spread below 180° puts a grid in front of it that
+//!   hides light from the side and leaves the whole power unchanged.
+//!
+//! Not normalised, the power is one of each unit of the light's surface, and a point without radius counts as 4 of them.
 
-use std::f32::consts::{FRAC_PI_4, PI};
+use std::f32::consts::{FRAC_1_PI, FRAC_PI_4, PI};
 
 use glam::{Mat4, Vec3};
 
@@ -127,14 +128,11 @@ impl Emitter {
     /// What is wrong with it, in words.
     pub fn new(light: &Light) -> Result<Option<Self>, String> {
         check(light)?;
-        let strength = light.color * light.power;
-        if strength == Vec3::ZERO {
-            return Ok(None);
-        }
-        let axis = -light.matrix.z_axis.truncate().normalize();
         let (shape, factor) = shape(light);
+        let strength = light.color * light.power * factor;
+        let axis = -light.matrix.z_axis.truncate().normalize();
         let position = light.matrix.w_axis.truncate();
-        Ok(Some(Self { shape, position, axis, strength: strength * factor, shadow: light.shadow }))
+        Ok((strength != Vec3::ZERO).then_some(Self { shape, position, axis, strength, shadow: light.shadow }))
     }
 
     /// How much light it gives, roughly: what many lights are chosen by. `radius` is the scene's.
@@ -224,14 +222,18 @@ impl Emitter {
         point: Vec3,
         random: [f32; 2],
     ) -> Option<Incident> {
-        let [x, y] = if round { disk_point(random) } else { random.map(|value| 2.0 * value - 1.0) };
+        let ([x, y], part) = match spread {
+            Some(spread) => spread.place(half, round, point - self.position, self.axis, random)?,
+            None if round => (disk_point(random), 1.0),
+            None => (random.map(|value| 2.0 * value - 1.0), 1.0),
+        };
         let to_sample = self.position + half[0] * x + half[1] * y - point;
         let square = to_sample.length_squared();
         let distance = square.sqrt();
         let direction = to_sample / distance;
         let cosine = -direction.dot(self.axis);
         let share = spread.map_or(1.0, |spread| spread.share(cosine));
-        let radiance = self.strength * (share * cosine / square);
+        let radiance = self.strength * (part * share * cosine / square);
         (cosine > 0.0 && share > 0.0 && square > 0.0).then_some(Incident { direction, distance, radiance })
     }
 }
@@ -261,14 +263,35 @@ impl Cone {
 }
 
 impl Spread {
-    /// Below this angle it stays at it, as in Cycles until version 4.
-    const LEAST: f32 = 1.0 / 180.0 * PI;
+    /// Narrower spreads are taken as this one, a tenth of a degree.
+    const LEAST: f32 = 0.1 / 180.0 * PI;
 
     /// The scale keeps the power: ∫ cos x (1 - tan x / tan a) sin x from 0 to a is (tan a - a) / (2 tan a).
     fn new(angle: f32) -> Option<Self> {
         let half = 0.5 * f64::from(angle.max(Self::LEAST));
         let tangent = half.tan();
         (angle < PI).then(|| Self { tangent: tangent as f32, scale: (1.0 / (tangent - half)) as f32 })
+    }
+
+    /// A place on the light, -1 to 1 along each of its half edges, in the part that shines to a point; and that part's
+    /// size over the light's. Without this, narrow spreads would be all noise.
+    fn place(
+        &self,
+        half: &[Vec3; 2],
+        round: bool,
+        point: Vec3,
+        axis: Vec3,
+        random: [f32; 2],
+    ) -> Option<([f32; 2], f32)> {
+        let reach = point.dot(axis).max(0.0) * self.tangent;
+        let range = half.map(|edge| {
+            let (middle, radius) = (point.dot(edge) / edge.length_squared(), reach / edge.length());
+            [(middle - radius).max(-1.0), (middle + radius).min(1.0)]
+        });
+        let [x, y] = [0, 1].map(|k| range[k][0] + random[k] * (range[k][1] - range[k][0]));
+        let part = 0.25 * range.iter().map(|[least, most]| (most - least).max(0.0)).product::<f32>();
+        let outside = round && x * x + y * y > 1.0;
+        (part > 0.0 && !outside).then_some(([x, y], if round { part / FRAC_PI_4 } else { part }))
     }
 
     #[inline]
@@ -292,8 +315,8 @@ fn shape(light: &Light) -> (Shape, f32) {
 }
 
 fn bulb_factor(bulb: Bulb, normalize: bool) -> f32 {
-    let surface = if normalize || bulb.radius == 0.0 { 1.0 } else { PI * bulb.radius * bulb.radius };
-    surface / (4.0 * PI)
+    let surface = if bulb.radius == 0.0 { 4.0 } else { 4.0 * PI * bulb.radius * bulb.radius };
+    if normalize { 1.0 / (4.0 * PI) } else { surface / (4.0 * PI) }
 }
 
 fn sun(angle: f32, normalize: bool) -> (Shape, f32) {
@@ -308,8 +331,13 @@ fn area(light: &Light, round: bool, size: [f32; 2], spread: f32) -> (Shape, f32)
     let columns = [light.matrix.x_axis, light.matrix.y_axis].map(|column| column.truncate());
     let half = [columns[0] * (0.5 * size[0]), columns[1] * (0.5 * size[1])];
     let rectangle = 4.0 * half[0].length() * half[1].length();
-    let surface = if light.normalize { 1.0 } else { rectangle * if round { FRAC_PI_4 } else { 1.0 } };
-    (Shape::Area { half, round, spread: Spread::new(spread) }, 0.25 * surface)
+    let surface = rectangle * if round { FRAC_PI_4 } else { 1.0 };
+    let power = match (light.normalize, surface > 0.0) {
+        (true, true) => 1.0,
+        (true, false) => 0.0, // Cycles' areas without surface are dark too.
+        (false, _) => surface,
+    };
+    (Shape::Area { half, round, spread: Spread::new(spread) }, FRAC_1_PI * power)
 }
 
 fn check(light: &Light) -> Result<(), String> {
