@@ -58,5 +58,15 @@ def show_image(image: bpy.types.Image) -> None:
         for area in window.screen.areas:
             space = area.spaces.active
             if area.ui_type == "IMAGE_EDITOR" and space.mode == "VIEW" and not space.use_image_pin:
-                space.image = image
-                area.tag_redraw()
+                _show(image, window, area)
+
+
+def _show(image: bpy.types.Image, window: bpy.types.Window, area: bpy.types.Area) -> None:
+    """Show the image in an Image Editor, all of it where the editor showed another."""
+    space = area.spaces.active
+    if space.image != image:
+        space.image = image
+        region = next(region for region in area.regions if region.type == "WINDOW")
+        with bpy.context.temp_override(window=window, area=area, region=region):
+            bpy.ops.image.view_all(fit_view=True)
+    area.tag_redraw()
