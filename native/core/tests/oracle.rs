@@ -3,28 +3,12 @@
 mod common;
 
 use common::*;
-use espalier_core::{Accelerator, Config, Job, Mesh, Method, simd::Level};
+use espalier_core::Mesh;
 use glam::Vec3;
 use proptest::prelude::*;
 use std::sync::Arc;
 
-fn agree(mesh: &Arc<Mesh>, rays: &RayBatch) {
-    let expected = brute_force(mesh, rays);
-    for method in Method::ALL {
-        for level in Level::available() {
-            let built = Accelerator::build(mesh.clone(), method, &Config::default(), 2, &Job::new()).unwrap();
-            let accelerator = built.with_level(level);
-            let hits = closest(&accelerator, rays);
-            for index in 0..rays.len() {
-                let name = (method.name(), level.name(), index, rays.ray(index));
-                assert_eq!(hits.get(index), expected.get(index), "{name:?}");
-            }
-            let blocked = occluded(&accelerator, rays);
-            let expected: Vec<bool> = expected.t.iter().map(|t| t.is_finite()).collect();
-            assert_eq!(blocked, expected, "{} {}", method.name(), level.name());
-        }
-    }
-}
+every_walk!([on_random_meshes, far_from_the_origin_and_at_any_scale, on_soups]);
 
 fn point(extent: f32) -> impl Strategy<Value = Vec3> {
     let coordinate = move || prop_oneof![4 => -extent..extent, 1 => Just(0.0), 1 => (-4i32..5).prop_map(move |i| i as f32 * extent / 4.0)];
@@ -39,36 +23,44 @@ fn soup() -> impl Strategy<Value = (Vec<Vec3>, Vec<[u32; 3]>)> {
     })
 }
 
-proptest! {
-    #![proptest_config(ProptestConfig::with_cases(48))]
-
-    #[test]
-    fn on_random_meshes((vertices, triangles) in soup(), ends in prop::collection::vec((point(2.0), point(1.0)), 1..60)) {
-        let mesh = Arc::new(Mesh::new(vertices, triangles).unwrap());
-        let mut rays = RayBatch::default();
-        for (origin, target) in ends.into_iter().filter(|(origin, target)| origin != target) {
-            rays.push(origin, target - origin, 0.0, f32::INFINITY);
-        }
-        agree(&mesh, &rays);
+/// Rays from the first point of each pair towards the second.
+fn towards(ends: Vec<(Vec3, Vec3)>) -> RayBatch {
+    let mut rays = RayBatch::default();
+    for (origin, target) in ends.into_iter().filter(|(origin, target)| origin != target) {
+        rays.push(origin, target - origin, 0.0, f32::INFINITY);
     }
+    rays
+}
 
-    #[test]
-    fn far_from_the_origin_and_at_any_scale(
-        (vertices, triangles) in soup(),
-        ends in prop::collection::vec((point(8.0), point(1.0)), 1..40),
-        offset in point(3e3), exponent in -30i32..30,
-    ) {
+fn on_random_meshes(walk: &Walk) {
+    let ends = prop::collection::vec((point(2.0), point(1.0)), 1..150);
+    proptest!(ProptestConfig::with_cases(24), |((vertices, triangles) in soup(), ends in ends)| {
+        let mesh = Arc::new(Mesh::new(vertices, triangles).unwrap());
+        walk.agrees(&mesh, &towards(ends));
+    });
+}
+
+fn far_from_the_origin_and_at_any_scale(walk: &Walk) {
+    let ends = prop::collection::vec((point(8.0), point(1.0)), 1..80);
+    proptest!(ProptestConfig::with_cases(24), |(
+        (vertices, triangles) in soup(), ends in ends, offset in point(3e3), exponent in -30i32..30,
+    )| {
         let scale = 2f32.powi(exponent);
         let place = |p: Vec3| (p + offset) * scale;
         let mesh = Arc::new(Mesh::new(vertices.into_iter().map(place).collect(), triangles).unwrap());
-        let mut rays = RayBatch::default();
-        for (origin, target) in ends.into_iter().filter(|(origin, target)| origin != target) {
-            let direction = place(target) - place(origin);
-            if direction != Vec3::ZERO {
-                rays.push(place(origin), direction, 0.0, f32::INFINITY);
-                rays.push(place(origin) - direction * 1e4, direction, 0.0, f32::INFINITY);
-            }
+        let mut rays = towards(ends.into_iter().map(|(origin, target)| (place(origin), place(target))).collect());
+        for index in 0..rays.len() {
+            let ray = rays.ray(index);
+            rays.push(ray.origin - ray.direction * 1e4, ray.direction, 0.0, f32::INFINITY);
         }
-        agree(&mesh, &rays);
-    }
+        walk.agrees(&mesh, &rays);
+    });
+}
+
+/// Uniform content of a size at which the hybrids find grids with their default settings.
+fn on_soups(walk: &Walk) {
+    let (vertices, triangles) = common::soup(1500, 0.15);
+    let mesh = Arc::new(Mesh::new(vertices, triangles).unwrap());
+    let ends = prop::collection::vec((point(2.0), point(1.0)), 300);
+    proptest!(ProptestConfig::with_cases(2), |(ends in ends)| walk.agrees(&mesh, &towards(ends)));
 }

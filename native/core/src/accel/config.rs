@@ -27,12 +27,16 @@ pub struct Config {
     pub sample_least: u32,
     /// Most rays a node is sampled with.
     pub sample_most: u32,
-    /// A node can be uniform where at least this share of its sample rays hit; 0 to 1.
+    /// A node is uniform where at least this share of its sample rays hit; 0 to 1. Measured: nodes of dense soups have
+    /// 0.93 to 0.97, large nodes of scans (bunny, dragon), halls (Sponza) and hair 0.3 to 0.77. Below 0.8, scans turn
+    /// into grids almost wholly, and are traced two to three times slower.
     pub hit_threshold: f64,
-    /// A node can be uniform where the hits over the strata vary at most this much more than chance alone would make
-    /// them (index of dispersion: chi-squared over its degrees of freedom).
+    /// A node is uniform where the hits over the strata vary at most this much more than chance alone would make them
+    /// (index of dispersion: chi-squared over its degrees of freedom; strata have about eight rays whatever the number
+    /// of rays, so that it means the same everywhere). Measured: nodes of soups have 0.8 to 1.4, large nodes of scans
+    /// and halls 1.3 to 3.
     pub spread_threshold: f64,
-    /// Nodes with fewer triangles never become grids.
+    /// Nodes with fewer triangles never become grids, and are not sampled. Half as many doubles the time of sampling.
     pub grid_least_triangles: usize,
     /// Nodes with more triangles never become grids.
     pub grid_most_triangles: usize,
@@ -74,9 +78,9 @@ impl Default for Config {
             sample_rays: 4096.0,
             sample_least: 32,
             sample_most: 1024,
-            hit_threshold: 0.5,
+            hit_threshold: 0.8,
             spread_threshold: 2.0,
-            grid_least_triangles: 64,
+            grid_least_triangles: 256,
             grid_most_triangles: 1 << 16,
             cost: CostConstants::default(),
         }

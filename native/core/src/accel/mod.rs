@@ -2,15 +2,19 @@
 
 pub mod cells;
 pub mod census;
+pub mod check;
 pub mod config;
 pub mod decision;
 pub mod grid;
+pub mod hybrid;
 pub mod median;
 pub mod overlap;
 pub mod pack;
 pub mod places;
 pub mod sah;
+pub mod sample;
 pub mod structure;
+pub mod subtree;
 pub mod tree;
 
 use std::{sync::Arc, time::Instant};
@@ -195,7 +199,8 @@ impl Builder<'_> {
         let tree = match method {
             Method::BvhSah => self.hierarchy(&sah::BinnedSah { bins: self.config.sah_bins })?,
             Method::Grid => self.single_grid()?,
-            Method::BvhMedian | Method::HybridSampled | Method::HybridCost => self.hierarchy(&median::CyclingMedian)?,
+            Method::BvhMedian | Method::HybridCost => self.hierarchy(&median::CyclingMedian)?,
+            Method::HybridSampled => self.hybrid(&hybrid::Sampled)?,
         };
         self.timed("pack", |this| pack::pack(&tree, this.mesh, this.job))
     }
@@ -203,6 +208,14 @@ impl Builder<'_> {
     fn hierarchy(&mut self, split: &impl tree::Split) -> Result<Tree, Error> {
         let items = self.timed("bounds", |this| tree::items(this.mesh))?;
         self.timed("split", |this| tree::build(items, this.config.leaf_size, split, this.job))
+    }
+
+    fn hybrid(&mut self, judge: &impl hybrid::Judge) -> Result<Tree, Error> {
+        let tree = self.hierarchy(&median::CyclingMedian)?;
+        let (tree, decisions) =
+            self.timed("verdicts", |this| hybrid::decide(tree, this.mesh, this.config, judge, this.job))?;
+        self.decisions = decisions;
+        Ok(tree)
     }
 
     fn single_grid(&mut self) -> Result<Tree, Error> {

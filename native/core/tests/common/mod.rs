@@ -3,9 +3,13 @@
 
 pub mod picture;
 
+use std::sync::Arc;
+
 use espalier_core::{
     Accelerator, Column, Config, Hits, Job, Mesh, Method, Rays,
+    accel::{check::assert_well_formed, config::CostConstants},
     ray::{Hit, MISS, Ray},
+    simd::Level,
     traverse::frame::{Domain, Frame},
     triangle,
 };
@@ -138,7 +142,99 @@ pub fn soup(count: usize, size: f32) -> (Vec<Vec3>, Vec<[u32; 3]>) {
 }
 
 /// The accelerator of every method over a mesh, built with two threads and default settings.
-pub fn build_all(mesh: &std::sync::Arc<Mesh>) -> Vec<Accelerator> {
+pub fn build_all(mesh: &Arc<Mesh>) -> Vec<Accelerator> {
     let build = |method| Accelerator::build(mesh.clone(), method, &Config::default(), 2, &Job::new()).unwrap();
     Method::ALL.map(build).into()
+}
+
+/// A method with its settings, walked with one instruction set.
+#[derive(Debug, Clone)]
+pub struct Walk {
+    pub method: Method,
+    pub config: Config,
+    pub level: Level,
+}
+
+impl Walk {
+    /// Build and check; on two threads, so that parallel parts run.
+    pub fn build(&self, mesh: &Arc<Mesh>) -> Accelerator {
+        let built = Accelerator::build(mesh.clone(), self.method, &self.config, 2, &Job::new()).unwrap();
+        assert_well_formed(built.structure(), mesh);
+        built.with_level(self.level)
+    }
+
+    /// Assert that closest and any hits equal brute force to the bit, for rays that walk together and alone.
+    pub fn agrees(&self, mesh: &Arc<Mesh>, rays: &RayBatch) {
+        let accelerator = self.build(mesh);
+        let expected = brute_force(mesh, rays);
+        let alone = (0..rays.len()).step_by(SMALL).map(|first| self.hits(&accelerator, rays, first, SMALL));
+        for hits in [self.hits(&accelerator, rays, 0, rays.len())].into_iter().chain(alone) {
+            for (index, hit, blocked) in hits {
+                assert_eq!(hit, expected.get(index), "ray {index}, {:?}, {self:?}", rays.ray(index));
+                assert_eq!(blocked, hit.primitive != MISS, "any hit, ray {index}, {:?}, {self:?}", rays.ray(index));
+            }
+        }
+    }
+
+    fn hits(&self, accelerator: &Accelerator, rays: &RayBatch, first: usize, count: usize) -> Vec<(usize, Hit, bool)> {
+        let part = rays.rays().part(first, count);
+        let (mut hits, mut blocked) = (Hits::misses(part.len()), vec![false; part.len()]);
+        accelerator.closest(&part, hits.as_mut(), 1, &Job::new()).unwrap();
+        accelerator.occluded(&part, &mut blocked, 1, &Job::new()).unwrap();
+        (0..part.len()).map(|index| (first + index, hits.get(index), blocked[index])).collect()
+    }
+}
+
+/// Batches of this size are traced ray by ray.
+const SMALL: usize = 16;
+
+/// Settings under which small nodes become grids readily, so that small meshes have hybrids too.
+pub fn eager() -> Config {
+    Config {
+        grid_least_triangles: 2,
+        grid_most_triangles: 100,
+        hit_threshold: 0.3,
+        spread_threshold: f64::INFINITY,
+        cost: CostConstants { node_ns: 50.0, block_ns: 50.0, reference_ns: 0.0, ..CostConstants::default() },
+        ..Config::default()
+    }
+}
+
+/// Run a test on the named variant of a method and instruction set, if this processor has it.
+pub fn run(variant: &str, level: &str, test: impl Fn(&Walk)) {
+    let (method, config) = match variant {
+        "bvh_median" => (Method::BvhMedian, Config::default()),
+        "bvh_sah" => (Method::BvhSah, Config::default()),
+        "grid" => (Method::Grid, Config::default()),
+        "hybrid_sampled" => (Method::HybridSampled, Config::default()),
+        "hybrid_cost" => (Method::HybridCost, Config::default()),
+        "eager_sampled" => (Method::HybridSampled, eager()),
+        "eager_cost" => (Method::HybridCost, eager()),
+        _ => panic!("no variant {variant}"),
+    };
+    match Level::available().into_iter().find(|available| available.name() == level) {
+        Some(level) => test(&Walk { method, config, level }),
+        None => eprintln!("skipped: this processor has no {level}"),
+    }
+}
+
+/// Make `VARIANT::LEVEL::TEST` of every method, instruction set and named function over a [`Walk`].
+#[macro_export]
+macro_rules! every_walk {
+    ($tests:tt) => {
+        $crate::every_walk!(@variants $tests;
+            bvh_median, bvh_sah, grid, hybrid_sampled, hybrid_cost, eager_sampled, eager_cost);
+    };
+    (@variants $tests:tt; $($variant:ident),+) => {
+        $(mod $variant { $crate::every_walk!(@levels $variant $tests; portable, avx2, avx512, neon); })+
+    };
+    (@levels $variant:ident $tests:tt; $($level:ident),+) => {
+        $(mod $level { $crate::every_walk!(@tests $variant $level $tests); })+
+    };
+    (@tests $variant:ident $level:ident [$($test:ident),+]) => {
+        $(#[test]
+        fn $test() {
+            $crate::common::run(stringify!($variant), stringify!($level), super::super::$test);
+        })+
+    };
 }

@@ -1,0 +1,170 @@
+//! What every structure must satisfy, whatever built it; run after every build in tests.
+
+use glam::{DVec3, Vec3};
+
+use super::{
+    places::{self, Place, levels},
+    structure::{Grid, NodeRef, Structure, Target},
+};
+use crate::{Mesh, bounds::Bounds, ray::MISS, triangle::LANES};
+
+/// Grids of at most this many pairs of cell and triangle are compared with brute force.
+const BRUTE_FORCE: usize = 1 << 22;
+
+/// Panic unless rays that walk `structure` can find every triangle of `mesh`.
+///
+/// # Panics
+/// With what is wrong.
+pub fn assert_well_formed(structure: &Structure, mesh: &Mesh) {
+    let places: Vec<Place> = levels(structure, &mesh.bounds()).flatten().collect();
+    assert_all_reached(structure, &places);
+    let mut owner = vec![None; mesh.triangles().len()];
+    for (index, place) in places.iter().enumerate() {
+        let primitives = match place.target {
+            Target::Branch(node) => {
+                assert_branch(structure, node as usize, place);
+                continue;
+            }
+            Target::Leaf { block, count } => assert_leaf(structure, mesh, block as usize, count as usize),
+            Target::Grid(grid) => assert_grid(structure, mesh, &structure.grids[grid as usize]),
+            Target::Empty => panic!("an empty place was reached"),
+        };
+        for primitive in primitives {
+            assert_contains(&place.bounds, &triangle_bounds(structure, mesh, primitive));
+            let before = owner[primitive as usize].replace(index);
+            assert_eq!(before, None, "triangle {primitive} stands in two places");
+        }
+    }
+    assert_owned(mesh, &owner);
+    let needed = stack_need(structure, structure.root);
+    assert!(structure.stack_size >= needed, "a stack of {} entries, {needed} needed", structure.stack_size);
+}
+
+fn assert_all_reached(structure: &Structure, places: &[Place]) {
+    let indices = |wanted: fn(Target) -> Option<u32>| {
+        let mut found: Vec<u32> = places.iter().filter_map(|place| wanted(place.target)).collect();
+        found.sort_unstable();
+        found
+    };
+    let all = |count: usize| (0..count as u32).collect::<Vec<_>>();
+    let branches = indices(|target| if let Target::Branch(index) = target { Some(index) } else { None });
+    let leaves = indices(|target| if let Target::Leaf { block, .. } = target { Some(block) } else { None });
+    let grids = indices(|target| if let Target::Grid(index) = target { Some(index) } else { None });
+    assert_eq!(branches, all(structure.nodes.len()), "nodes not reached exactly once");
+    assert_eq!(leaves, all(structure.blocks.len()), "blocks not reached exactly once");
+    assert_eq!(grids, all(structure.grids.len()), "grids not reached exactly once");
+}
+
+fn assert_branch(structure: &Structure, index: usize, place: &Place) {
+    let node = &structure.nodes[index];
+    assert!(node.len() >= 2, "node {index} has {} children", node.len());
+    for lane in node.len()..LANES {
+        assert!(node.child[lane] == NodeRef::EMPTY && node.bounds(lane).is_empty(), "lane {lane} of node {index}");
+    }
+    for order in node.order {
+        let mut lanes: [u32; LANES] = std::array::from_fn(|step| order >> (3 * step) & 7);
+        lanes.sort_unstable();
+        assert_eq!(lanes, std::array::from_fn(|lane| lane as u32), "order of visits of node {index}");
+    }
+    for child in places::children(structure, place) {
+        assert_contains(&place.bounds, &child.bounds);
+        if let Target::Branch(below) = child.target {
+            assert!(below as usize > index, "node {below} stands before its parent {index}");
+        }
+    }
+}
+
+fn assert_leaf(structure: &Structure, mesh: &Mesh, index: usize, count: usize) -> Vec<u32> {
+    let block = &structure.blocks[index];
+    assert!(block.primitive[count..].iter().all(|&primitive| primitive == MISS), "unused lanes of block {index}");
+    for lane in 0..count {
+        let corners = block.corner.map(|corner| Vec3::from_array(corner.map(|axis| axis[lane])));
+        assert_eq!(corners, mesh.corners(block.primitive[lane]), "lane {lane} of block {index}");
+    }
+    block.primitive[..count].to_vec()
+}
+
+/// The distinct triangles of a grid.
+fn assert_grid(structure: &Structure, mesh: &Mesh, grid: &Grid) -> Vec<u32> {
+    assert!(grid.cell.iter().chain(&grid.inverse_cell).all(|edge| edge.is_finite() && *edge > 0.0), "{grid:?}");
+    let row = &structure.starts[grid.first..=grid.first + grid.cell_count()];
+    assert!(row.is_sorted() && row[grid.cell_count()] as usize <= structure.references.len(), "starts of {grid:?}");
+    let mut primitives = structure.references[row[0] as usize..row[grid.cell_count()] as usize].to_vec();
+    primitives.sort_unstable();
+    primitives.dedup();
+    if grid.cell_count() * primitives.len() <= BRUTE_FORCE {
+        (0..grid.cell_count()).for_each(|cell| assert_cell(structure, mesh, grid, cell, &primitives));
+    }
+    primitives
+}
+
+/// A cell lists what overlaps it, and nothing that is farther than twice the margin.
+fn assert_cell(structure: &Structure, mesh: &Mesh, grid: &Grid, cell: usize, primitives: &[u32]) {
+    let listed = structure.cell(grid, cell);
+    let mut sorted = listed.to_vec();
+    sorted.sort_unstable();
+    assert!(sorted.windows(2).all(|pair| pair[0] < pair[1]), "cell {cell} lists a triangle twice: {listed:?}");
+    let bounds = grid.cell_bounds(cell);
+    let generous = bounds.dilated(2.0 * structure.domain.margin());
+    for &primitive in primitives {
+        let corners = mesh.corners(primitive).map(|corner| corner - structure.domain.centre);
+        let is_listed = sorted.binary_search(&primitive).is_ok();
+        assert!(is_listed || !overlaps(&bounds, corners), "cell {cell} lacks triangle {primitive}");
+        assert!(!is_listed || overlaps(&generous, corners), "cell {cell} lists triangle {primitive} from afar");
+    }
+}
+
+/// Whether a triangle meets a box: what remains of it after a cut along every side, in double precision. Shares no
+/// arithmetic with the separating axes that grids are built by.
+fn overlaps(bounds: &Bounds, corners: [Vec3; 3]) -> bool {
+    let mut polygon = corners.map(|corner| corner.as_dvec3()).to_vec();
+    for axis in 0..3 {
+        let (lower, upper) = (f64::from(bounds.lower[axis]), f64::from(bounds.upper[axis]));
+        polygon = cut(&polygon, |point| point[axis] - lower);
+        polygon = cut(&polygon, |point| upper - point[axis]);
+    }
+    !polygon.is_empty()
+}
+
+/// The part of a convex polygon where `side` is not negative (Sutherland and Hodgman, CACM 17(1), 1974).
+fn cut(polygon: &[DVec3], side: impl Fn(DVec3) -> f64) -> Vec<DVec3> {
+    let mut rest = Vec::with_capacity(polygon.len() + 1);
+    for (index, &point) in polygon.iter().enumerate() {
+        let next = polygon[(index + 1) % polygon.len()];
+        let (here, there) = (side(point), side(next));
+        if here >= 0.0 {
+            rest.push(point);
+        }
+        if (here < 0.0) != (there < 0.0) {
+            rest.push(point.lerp(next, here / (here - there)));
+        }
+    }
+    rest
+}
+
+fn assert_owned(mesh: &Mesh, owner: &[Option<usize>]) {
+    let lost = mesh.solid().iter().find(|&&primitive| owner[primitive as usize].is_none());
+    assert_eq!(lost, None, "a triangle is nowhere");
+    let held = owner.iter().filter(|owner| owner.is_some()).count();
+    assert_eq!(held, mesh.solid().len(), "triangles without area are held");
+}
+
+fn triangle_bounds(structure: &Structure, mesh: &Mesh, primitive: u32) -> Bounds {
+    Bounds::of_points(mesh.corners(primitive).map(|corner| corner - structure.domain.centre))
+}
+
+fn assert_contains(outer: &Bounds, inner: &Bounds) {
+    let contains = outer.lower.cmple(inner.lower).all() && inner.upper.cmple(outer.upper).all();
+    assert!(contains, "{outer:?} does not contain {inner:?}");
+}
+
+/// The most entries that a walk from a place can have on its stack: all children but the one that is visited, at every
+/// level.
+fn stack_need(structure: &Structure, place: NodeRef) -> usize {
+    let Target::Branch(index) = place.target() else {
+        return 0;
+    };
+    let node = &structure.nodes[index as usize];
+    let below = (0..node.len()).map(|lane| stack_need(structure, node.child[lane])).max();
+    node.len() - 1 + below.unwrap_or(0)
+}
