@@ -38,6 +38,21 @@ impl<'a> Column<'a> {
         if self.stride == 0 { usize::MAX } else { self.values.len().div_ceil(self.stride) }
     }
 
+    /// The values of rays `index` to `index + 7`.
+    #[inline(always)]
+    fn eight(&self, index: usize) -> [f32; 8] {
+        if let (1, Some(values)) = (self.stride, self.values.get(index..index + 8)) {
+            let mut eight = [0.0; 8];
+            eight.copy_from_slice(values);
+            return eight;
+        }
+        let mut eight = [0.0; 8];
+        for lane in 0..8 {
+            eight[lane] = self.values[(index + lane) * self.stride];
+        }
+        eight
+    }
+
     /// The value of ray `index`.
     #[inline]
     pub fn get(&self, index: usize) -> f32 {
@@ -110,10 +125,27 @@ impl<'a> Rays<'a> {
     ///
     /// # Errors
     /// [`Error::Ray`] where [`Frame::new`](crate::traverse::frame::Frame::new) has none for it.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn frame(&self, index: usize, domain: &Domain) -> Result<Frame, Error> {
         let ray = self.get(index);
         Frame::new(&ray, domain).ok_or_else(|| ray.fault(self.first + index))
+    }
+
+    /// Rays `index` to `index + 7`, by column: origin, direction, tmin, tmax.
+    #[inline(always)]
+    pub(crate) fn eight(&self, index: usize) -> [[f32; 8]; 8] {
+        let index = self.first + index;
+        let ([ox, oy, oz], [dx, dy, dz]) = (&self.origin, &self.direction);
+        [
+            ox.eight(index),
+            oy.eight(index),
+            oz.eight(index),
+            dx.eight(index),
+            dy.eight(index),
+            dz.eight(index),
+            self.tmin.eight(index),
+            self.tmax.eight(index),
+        ]
     }
 
     /// Gather ray `index`.

@@ -34,7 +34,7 @@ impl Block {
     pub const EMPTY: Self = Self { corner: [[[0.0; LANES]; 3]; 3], primitive: [MISS; LANES] };
 
     /// Put a triangle into a lane.
-    #[inline]
+    #[inline(always)]
     pub fn set(&mut self, lane: usize, primitive: u32, corners: [Vec3; 3]) {
         for (c, corner) in corners.iter().enumerate() {
             for k in 0..3 {
@@ -45,13 +45,13 @@ impl Block {
     }
 
     /// The corners in a lane.
-    #[inline]
+    #[inline(always)]
     fn corners(&self, lane: usize) -> [[f32; 3]; 3] {
         self.corner.map(|corner| corner.map(|axis| axis[lane]))
     }
 
     /// The exact test of one lane.
-    #[inline]
+    #[inline(always)]
     pub fn intersect(&self, lane: usize, frame: &Frame) -> Option<Hit> {
         intersect(frame, self.corners(lane), self.primitive[lane])
     }
@@ -60,7 +60,7 @@ impl Block {
 /// Where a ray meets a triangle, in the frame's units, if it does so within the frame's interval.
 ///
 /// The parameter and the weights are evaluated in double precision and rounded once.
-#[inline]
+#[inline(always)]
 pub fn intersect(frame: &Frame, corners: [[f32; 3]; 3], primitive: u32) -> Option<Hit> {
     let [a, b, c] = corners.map(|corner| shear(frame, corner));
     let (u, v, w) = (edge(c, b), edge(a, c), edge(b, a));
@@ -80,7 +80,7 @@ pub fn intersect(frame: &Frame, corners: [[f32; 3]; 3], primitive: u32) -> Optio
 
 /// A corner in sheared space. x and y are rounded to single precision step by step, in the order the vector filter
 /// rounds them, so that the filter and this test see the same point.
-#[inline]
+#[inline(always)]
 fn shear(frame: &Frame, corner: [f32; 3]) -> [f64; 3] {
     let [kx, ky, kz] = frame.axes.map(|axis| axis as usize);
     let p: [f32; 3] = std::array::from_fn(|k| corner[k] - frame.origin[k]);
@@ -90,14 +90,14 @@ fn shear(frame: &Frame, corner: [f32; 3]) -> [f64; 3] {
 }
 
 /// Twice the signed area of the triangle of the origin, `p` and `q`, in x and y.
-#[inline]
+#[inline(always)]
 fn edge(p: [f64; 3], q: [f64; 3]) -> f64 {
     p[0] * q[1] - p[1] * q[0]
 }
 
 /// On which side of the edge from `b` to `c` the origin lies, where `value` = `edge(c, b)`; zero only for an edge of
 /// no length, which no ray hits.
-#[inline]
+#[inline(always)]
 fn sign(value: f64, b: [f64; 3], c: [f64; 3]) -> i8 {
     let decisive = if value != 0.0 {
         value

@@ -29,6 +29,20 @@ pub trait Simd: Copy + Send + Sync + 'static {
     fn load(self, values: &[f32; 8]) -> Self::F32;
     /// Eight numbers to memory.
     fn store(self, value: Self::F32) -> [f32; 8];
+    /// a + b
+    fn add(self, a: Self::F32, b: Self::F32) -> Self::F32;
+    /// a / b
+    fn div(self, a: Self::F32, b: Self::F32) -> Self::F32;
+    /// The bits that are set in both.
+    fn and(self, a: Self::F32, b: Self::F32) -> Self::F32;
+    /// The bits that are set in one or the other.
+    fn or(self, a: Self::F32, b: Self::F32) -> Self::F32;
+    /// The difference of the bits as integers.
+    fn sub_bits(self, a: Self::F32, b: Self::F32) -> Self::F32;
+    /// Where a >= b the first choice, elsewhere the second.
+    fn if_ge(self, a: Self::F32, b: Self::F32, first: Self::F32, second: Self::F32) -> Self::F32;
+    /// Rows to columns.
+    fn transpose(self, rows: [Self::F32; 8]) -> [Self::F32; 8];
     /// a - b
     fn sub(self, a: Self::F32, b: Self::F32) -> Self::F32;
     /// a * b

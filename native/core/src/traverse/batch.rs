@@ -6,8 +6,11 @@ use super::{
     frame::Frame,
     kernel::{self, Entry},
     probe::{Counts, Probe, Silent},
+    setup,
     stream::{self, Bin, Lists},
 };
+use bytemuck::Zeroable;
+
 use crate::{
     Error, Job, Mesh,
     accel::structure::Structure,
@@ -15,6 +18,7 @@ use crate::{
     pool,
     ray::{Hit, HitsMut, MISS, Rays},
     simd::{Kernel, Level, Simd},
+    triangle::LANES,
 };
 
 /// A structure, the mesh it stands for, and the instruction set to use.
@@ -166,12 +170,21 @@ impl<F: FnMut(usize, &Frame, Hit)> Streams<'_, F> {
     #[inline(always)]
     fn each<S: Simd, const GRIDS: bool, const ANY: bool>(mut self, simd: S) -> Result<(), Error> {
         self.room.bins.iter_mut().for_each(Bin::clear);
-        for index in 0..self.rays.len() {
-            let frame = self.rays.frame(index, &self.tracer.structure.domain)?;
-            let octant = frame.octant();
-            self.room.bins[octant].push(index, frame);
-            if self.room.bins[octant].is_full() {
-                self.flush::<S, GRIDS, ANY>(simd, octant);
+        let count = self.rays.len();
+        for first in (0..count).step_by(LANES) {
+            let mut frames = [Frame::zeroed(); LANES];
+            let lanes = LANES.min(count - first);
+            if lanes < LANES || !setup::eight(simd, self.rays, first, &self.tracer.structure.domain, &mut frames) {
+                for lane in 0..lanes {
+                    frames[lane] = self.rays.frame(first + lane, &self.tracer.structure.domain)?;
+                }
+            }
+            for lane in 0..lanes {
+                let octant = frames[lane].octant();
+                self.room.bins[octant].push(first + lane, frames[lane]);
+                if self.room.bins[octant].is_full() {
+                    self.flush::<S, GRIDS, ANY>(simd, octant);
+                }
             }
         }
         for octant in 0..8 {

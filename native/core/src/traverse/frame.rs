@@ -9,9 +9,11 @@
 //!   in double precision; hits are reported from the true origin. So R is at most (NEAR + 2) half extents.
 //! * Box and grid planes are held relative to the scene's centre, so that a scene far from the world's origin is
 //!   culled as well as one at it. Their distances are one multiply-add, `plane * inverse + bias`; its error, the
-//!   error of the sheared vertices (at most 6uR, Woop et al. 2013) and the subtraction of the centre sum to less than
-//!   20uR. Boxes are therefore tested dilated by [`DILATION`]·R, which costs nothing: it is part of the two biases.
+//!   error of the sheared vertices (at most 8uR, Woop et al. 2013, with a slope rounded twice) and the subtraction of
+//!   the centre sum to less than 22uR. Boxes are therefore tested dilated by [`DILATION`]·R, which costs nothing: it is
+//!   part of the two biases.
 
+use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
 
 use crate::{bounds::Bounds, ray::Ray};
@@ -24,7 +26,7 @@ pub const DILATION: f32 = 32.0 / (1 << 24) as f32;
 
 /// Below this share of the largest component, a direction component is treated as zero: over the whole scene it moves
 /// a ray by far less than the dilation, and its inverse stays finite.
-const PARALLEL: f32 = 1e-18;
+pub(super) const PARALLEL: f32 = 1e-18;
 
 /// Where the scene is, as far as the arithmetic of rays needs to know.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -53,7 +55,7 @@ impl Domain {
 }
 
 /// See the module's text. Two cache lines: what box tests read, then what triangle tests read.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub struct Frame {
     /// Inverse of the direction, finite.
@@ -68,7 +70,7 @@ pub struct Frame {
     pub tmax: f32,
     /// Origin relative to the centre of the domain.
     pub local: [f32; 3],
-    advance: f64,
+    pub(super) advance: f64,
     /// Origin of the triangle test, in the mesh's own coordinates.
     pub origin: [f32; 3],
     /// Direction over its dominant component, for the sheared x and y.
@@ -77,7 +79,8 @@ pub struct Frame {
     pub axes: [u32; 3],
     /// Direction, its largest component in [1, 2).
     pub direction: [f32; 3],
-    scale: f32,
+    pub(super) scale: f32,
+    pub(super) unused: [f32; 4],
 }
 
 impl Frame {
@@ -85,43 +88,68 @@ impl Frame {
     #[inline]
     pub fn new(ray: &Ray, domain: &Domain) -> Option<Self> {
         let largest = ray.direction.abs().max_element();
-        let finite = ray.origin.is_finite() && ray.direction.is_finite() && !ray.tmin.is_nan() && !ray.tmax.is_nan();
-        if !finite || largest < 1e-37 {
+        // Zero times anything finite is zero; times anything else it is not a number.
+        let finite = (ray.origin * 0.0 + ray.direction * 0.0).element_sum() == 0.0;
+        if !finite || largest < 1e-37 || ray.tmin.partial_cmp(&ray.tmax).is_none() {
             return None;
         }
         let exponent = largest.to_bits() >> 23;
-        let scale = f32::from_bits((254 - exponent).max(1) << 23);
+        let power = |exponent: u32| f32::from_bits(exponent << 23);
+        let (scale, length) = if exponent < 254 { (power(254 - exponent), power(exponent)) } else { (0.5, 2.0) };
         let direction = ray.direction * scale;
-        let Some((origin, advance)) = bring_near(ray.origin, direction, domain) else {
-            return Some(Self::near(domain.centre, direction, f32::INFINITY, f32::NEG_INFINITY, domain, scale, 0.0));
-        };
-        let (tmin, tmax) = interval(ray, scale, advance);
-        Some(Self::near(origin, direction, tmin, tmax, domain, scale, advance))
+        let local = ray.origin - domain.centre;
+        let reach = local.abs().max_element();
+        if reach > NEAR * domain.half_extent {
+            return Some(Self::from_afar(ray, direction, domain, scale));
+        }
+        let interval = (ray.tmin * length, ray.tmax * length);
+        Some(Self { scale, ..Self::near(ray.origin, local, reach, direction, interval, domain) })
     }
 
     #[inline]
-    #[allow(clippy::too_many_arguments)] // The one constructor of a wide plain struct.
-    fn near(origin: Vec3, direction: Vec3, tmin: f32, tmax: f32, domain: &Domain, scale: f32, advance: f64) -> Self {
-        let local = origin - domain.centre;
-        let margin = DILATION * (local.abs().max_element() + domain.half_extent) + f32::MIN_POSITIVE;
-        let inverse = direction.to_array().map(|d| 1.0 / if d.abs() < PARALLEL { PARALLEL.copysign(d) } else { d });
+    fn near(origin: Vec3, local: Vec3, reach: f32, direction: Vec3, (tmin, tmax): (f32, f32), domain: &Domain) -> Self {
+        let margin = DILATION * (reach + domain.half_extent) + f32::MIN_POSITIVE;
+        let parallel = direction.abs().cmplt(Vec3::splat(PARALLEL));
+        let inverse = Vec3::select(parallel, Vec3::splat(PARALLEL).copysign(direction), direction).recip();
+        let (bias, slack) = (-local * inverse, inverse.abs() * margin);
         let axes = dominant_last(direction);
-        let d = direction.to_array();
-        let bias = |side: f32| std::array::from_fn(|k| -local[k] * inverse[k] + side * margin * inverse[k].abs());
+        let (d, inverse) = (direction.to_array(), inverse.to_array());
+        let steepness = inverse[axes[2] as usize];
         Self {
-            origin: origin.to_array(),
-            direction: d,
-            axes,
-            shear: [d[axes[0] as usize] / d[axes[2] as usize], d[axes[1] as usize] / d[axes[2] as usize]],
             inverse,
-            near_bias: bias(-1.0),
-            far_bias: bias(1.0),
-            local: local.to_array(),
+            near_bias: (bias - slack).to_array(),
+            far_bias: (bias + slack).to_array(),
             tmin,
             tmax,
-            scale,
-            advance,
+            local: local.to_array(),
+            advance: 0.0,
+            origin: origin.to_array(),
+            shear: [d[axes[0] as usize] * steepness, d[axes[1] as usize] * steepness],
+            axes,
+            direction: d,
+            scale: 1.0,
+            unused: [0.0; 4],
         }
+    }
+
+    /// The frame of a ray whose origin is far, begun two half extents before the closest approach to the scene's
+    /// centre. A ray that meets the scene's bounding sphere (radius at most √3 half extents) is then within √7 half
+    /// extents of the centre; of one that does not, the interval is made empty.
+    #[cold]
+    fn from_afar(ray: &Ray, direction: Vec3, domain: &Domain, scale: f32) -> Self {
+        let (o, d) = (ray.origin.as_dvec3(), direction.as_dvec3());
+        let to_centre: DVec3 = domain.centre.as_dvec3() - o;
+        let advance = to_centre.dot(d) / d.length_squared() - 2.0 * f64::from(domain.half_extent) / d.length();
+        let origin = (o + d * advance).as_vec3();
+        let local = origin - domain.centre;
+        let reach = local.abs().max_element();
+        if reach > NEAR * domain.half_extent {
+            let nowhere = (f32::INFINITY, f32::NEG_INFINITY);
+            return Self::near(domain.centre, Vec3::ZERO, 0.0, direction, nowhere, domain);
+        }
+        let shifted = |t: f32| (f64::from(t) / f64::from(scale) - advance) as f32;
+        let interval = (shifted(ray.tmin), shifted(ray.tmax));
+        Self { scale, advance, ..Self::near(origin, local, reach, direction, interval, domain) }
     }
 
     /// The signs of the direction: bit `k` is set where it falls along axis `k`.
@@ -141,44 +169,11 @@ impl Frame {
     }
 }
 
-/// Sheared z is the axis along which the ray is steepest.
+/// Sheared z is the axis along which the ray is steepest. Without branches: which axis it is cannot be predicted.
 #[inline]
 fn dominant_last(direction: Vec3) -> [u32; 3] {
     let a = direction.abs();
-    if a.x >= a.y && a.x >= a.z {
-        [1, 2, 0]
-    } else if a.y >= a.z {
-        [2, 0, 1]
-    } else {
-        [0, 1, 2]
-    }
-}
-
-/// The interval in the frame's units. One that lies wholly outside single precision becomes empty.
-#[inline]
-fn interval(ray: &Ray, scale: f32, advance: f64) -> (f32, f32) {
-    if advance == 0.0 {
-        return (ray.tmin / scale, ray.tmax / scale);
-    }
-    let shifted = |t: f32| (f64::from(t) / f64::from(scale) - advance) as f32;
-    (shifted(ray.tmin), shifted(ray.tmax))
-}
-
-/// The origin, moved along the ray where it is far, and how far it was moved; `None` where the ray passes the scene by.
-#[inline]
-fn bring_near(origin: Vec3, direction: Vec3, domain: &Domain) -> Option<(Vec3, f64)> {
-    let is_near = (origin - domain.centre).abs().max_element() <= NEAR * domain.half_extent;
-    if is_near { Some((origin, 0.0)) } else { approach(origin, direction, domain) }
-}
-
-/// Move a far origin to two half extents before its closest approach to the scene's centre. A ray that meets the
-/// scene's bounding sphere (radius at most √3 half extents) is then within √7 half extents of the centre.
-#[cold]
-fn approach(origin: Vec3, direction: Vec3, domain: &Domain) -> Option<(Vec3, f64)> {
-    let (o, d) = (origin.as_dvec3(), direction.as_dvec3());
-    let to_centre: DVec3 = domain.centre.as_dvec3() - o;
-    let advance = to_centre.dot(d) / d.length_squared() - 2.0 * f64::from(domain.half_extent) / d.length();
-    let moved = (o + d * advance).as_vec3();
-    let arrived = (moved - domain.centre).abs().max_element() <= NEAR * domain.half_extent;
-    arrived.then_some((moved, advance))
+    let x = (a.x >= a.y) & (a.x >= a.z);
+    let last = if x { 0 } else { 2 - u32::from(a.y >= a.z) };
+    [[1, 2, 0], [2, 0, 1], [0, 1, 2]][last as usize]
 }

@@ -6,6 +6,7 @@ pub mod frame;
 mod kernel;
 mod leaf;
 pub mod probe;
+mod setup;
 mod stream;
 
 pub use batch::Tracer;

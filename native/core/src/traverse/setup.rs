@@ -1,0 +1,131 @@
+//! Eight frames at once: [`Frame::new`] in vectors, operation by operation, so that both give the same bits.
+
+use super::frame::{DILATION, Domain, Frame, NEAR, PARALLEL};
+use crate::{ray::Rays, simd::Simd, triangle::LANES};
+
+/// The frames of rays `first` to `first + 7`, which the batch must have. False where one of them is unusable or begins
+/// far away; then `frames` is unspecified, and [`Frame::new`] is to be asked for each.
+#[inline(always)]
+pub fn eight<S: Simd>(simd: S, rays: &Rays<'_>, first: usize, domain: &Domain, frames: &mut [Frame; LANES]) -> bool {
+    let columns = rays.eight(first);
+    let zero = simd.splat(0.0);
+    let [mut origin, mut direction, mut local, mut to_centre] = [[zero; 3]; 4];
+    let (mut finite, mut largest, mut reach) = (zero, zero, zero);
+    for k in 0..3 {
+        let centre = simd.splat(domain.centre[k]);
+        origin[k] = simd.load(&columns[k]);
+        direction[k] = simd.load(&columns[3 + k]);
+        local[k] = simd.sub(origin[k], centre);
+        to_centre[k] = simd.sub(centre, origin[k]);
+        finite = simd.add(finite, simd.add(simd.mul(origin[k], zero), simd.mul(direction[k], zero)));
+        largest = simd.max(absolute(simd, direction[k]), largest);
+        reach = simd.max(absolute(simd, local[k]), reach);
+    }
+    let (tmin, tmax) = (simd.load(&columns[6]), simd.load(&columns[7]));
+    let sound = simd.le(finite, zero)
+        & simd.le(simd.splat(1e-37), largest)
+        & simd.le(largest, simd.splat(1e38))
+        & simd.le(reach, simd.splat(NEAR * domain.half_extent))
+        & (simd.le(tmin, tmax) | simd.le(tmax, tmin));
+    if sound != 0xff {
+        return false;
+    }
+
+    let length = simd.and(largest, simd.splat(f32::INFINITY));
+    let scale = simd.sub_bits(simd.splat(f32::from_bits(254 << 23)), length);
+    let margin = simd.mul(simd.splat(DILATION), simd.add(reach, simd.splat(domain.half_extent)));
+    let margin = simd.add(margin, simd.splat(f32::MIN_POSITIVE));
+    let [mut inverse, mut near_bias, mut far_bias] = [[zero; 3]; 3];
+    for k in 0..3 {
+        direction[k] = simd.mul(direction[k], scale);
+        let sign = simd.and(direction[k], simd.splat(-0.0));
+        let steep = simd.max(absolute(simd, direction[k]), simd.splat(PARALLEL));
+        inverse[k] = simd.div(simd.splat(1.0), simd.or(steep, sign));
+        let bias = simd.mul(to_centre[k], inverse[k]);
+        let slack = simd.mul(absolute(simd, inverse[k]), margin);
+        near_bias[k] = simd.sub(bias, slack);
+        far_bias[k] = simd.add(bias, slack);
+    }
+    let (axes, shear) = shear(simd, direction, inverse);
+    let (tmin, tmax) = (simd.mul(tmin, length), simd.mul(tmax, length));
+
+    let [i, n, f, l, o, d] = [inverse, near_bias, far_bias, local, origin, direction];
+    let rows = [
+        simd.transpose([i[0], i[1], i[2], n[0], n[1], n[2], f[0], f[1]]),
+        simd.transpose([f[2], tmin, tmax, l[0], l[1], l[2], zero, zero]),
+        simd.transpose([o[0], o[1], o[2], shear[0], shear[1], axes[0], axes[1], axes[2]]),
+        simd.transpose([d[0], d[1], d[2], scale, zero, zero, zero, zero]),
+    ];
+    for lane in 0..LANES {
+        let [a, b, c, d] = rows;
+        frames[lane] =
+            bytemuck::cast([simd.store(a[lane]), simd.store(b[lane]), simd.store(c[lane]), simd.store(d[lane])]);
+    }
+    true
+}
+
+#[inline(always)]
+fn absolute<S: Simd>(simd: S, value: S::F32) -> S::F32 {
+    simd.and(value, simd.splat(f32::from_bits(i32::MAX as u32)))
+}
+
+/// The axes of the sheared space, as bits, and the direction over its dominant component.
+#[inline(always)]
+fn shear<S: Simd>(simd: S, direction: [S::F32; 3], inverse: [S::F32; 3]) -> ([S::F32; 3], [S::F32; 2]) {
+    let [x, y, z] = direction;
+    let size = [absolute(simd, x), absolute(simd, y), absolute(simd, z)];
+    let greatest = simd.max(simd.max(size[1], size[2]), size[0]);
+    let axis = [0, 1, 2].map(f32::from_bits).map(|bits| simd.splat(bits));
+    let choose = |of_x, of_y, of_z| {
+        let others = simd.if_ge(size[1], size[2], of_y, of_z);
+        simd.if_ge(size[0], greatest, of_x, others)
+    };
+    let axes =
+        [choose(axis[1], axis[2], axis[0]), choose(axis[2], axis[0], axis[1]), choose(axis[0], axis[1], axis[2])];
+    let steepness = choose(inverse[0], inverse[1], inverse[2]);
+    (axes, [simd.mul(choose(y, z, x), steepness), simd.mul(choose(z, x, y), steepness)])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        ray::Column,
+        simd::{Kernel, Level},
+    };
+    use bytemuck::Zeroable;
+    use glam::Vec3;
+
+    struct Eight<'a>(&'a Rays<'a>, &'a Domain);
+
+    impl Kernel for Eight<'_> {
+        type Output = Option<[Frame; LANES]>;
+        #[inline(always)]
+        fn run<S: Simd>(self, simd: S) -> Self::Output {
+            let mut frames = [Frame::zeroed(); LANES];
+            eight(simd, self.0, 0, self.1, &mut frames).then_some(frames)
+        }
+    }
+
+    #[test]
+    fn frames_have_the_bits_of_the_single_ray() {
+        let domain = Domain { centre: Vec3::new(0.3, -7.0, 2.0), half_extent: 5.0 };
+        let column = |seed: u32| -> Vec<f32> {
+            (0..8u32).map(|i| ((i * 7 + seed * 13) % 11) as f32 * 0.37 - 1.85 + seed as f32 * 0.01).collect()
+        };
+        let mut columns: Vec<Vec<f32>> = (0..6).map(column).collect();
+        columns[3][0] = 0.0;
+        columns[4][0] = -0.0;
+        columns[4][1] = columns[3][1];
+        columns[5][1] = -columns[3][1];
+        let [o, d] = [0, 3].map(|first| [0, 1, 2].map(|k| Column::new(&columns[first + k])));
+        let rays = Rays::new(o, d, Column::constant(&0.5), Column::constant(&f32::INFINITY), 8).unwrap();
+        for level in Level::available() {
+            let frames = level.run(Eight(&rays, &domain)).unwrap();
+            for lane in 0..LANES {
+                let single = Frame::new(&rays.get(lane), &domain).unwrap();
+                assert_eq!(bytemuck::bytes_of(&frames[lane]), bytemuck::bytes_of(&single), "{} {lane}", level.name());
+            }
+        }
+    }
+}
