@@ -1,8 +1,13 @@
 """Areas of the interface: drawing them again, and showing an image in the Image Editors that are free for it."""
 
+import functools
+
 import bpy
 import numpy as np
 from numpy.typing import NDArray
+
+SETTLE_SECONDS = (0.1, 0.4)
+"""When to draw panels again after their height changed; Blender animates the move for 0.3 s."""
 
 MARK = "espalier"
 """Custom property of the images made here."""
@@ -14,6 +19,14 @@ def redraw(kinds: frozenset[str]) -> None:
         for area in window.screen.areas:
             if area.type in kinds:
                 area.tag_redraw()
+
+
+def redraw_settled(kinds: frozenset[str]) -> None:
+    """Redraw for changes of a panel's height: Blender moves the panels below only in the draws that follow."""
+    redraw(kinds)
+    if not bpy.app.background:
+        for seconds in SETTLE_SECONDS:
+            bpy.app.timers.register(functools.partial(redraw, kinds), first_interval=seconds)
 
 
 def store_image(name: str, pixels: NDArray[np.float32]) -> bpy.types.Image:

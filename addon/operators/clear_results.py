@@ -27,7 +27,7 @@ class ESPALIER_OT_clear_results(bpy.types.Operator):
         results.drop(uid)
         session.drop(uid)
         overlay.drop(uid)
-        areas.redraw(task.VIEWS)
+        areas.redraw_settled(task.VIEWS)
         return {"FINISHED"}
 
 

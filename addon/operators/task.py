@@ -6,11 +6,14 @@ from typing import Any, ClassVar, Protocol
 import bpy
 
 from .. import results
-from ..areas import redraw
+from ..areas import redraw, redraw_settled
 from ..native import expected_errors
 
 TICK_SECONDS = 0.05
 """How often progress is looked at; the core polls for a cancel as often, so Esc is obeyed within 0.2 s."""
+
+CANCEL_SECONDS = 0.15
+"""How long Esc waits for the thread, which needs less: a next tick may be late where redraws are slow."""
 
 PANELS = frozenset({"PROPERTIES"})
 VIEWS = PANELS | {"VIEW_3D"}
@@ -57,6 +60,7 @@ class TaskOperator:
     _task: Task
     _scene_uid: int
     _timer: Any = None
+    _shown = ("", "")
     bl_options: ClassVar[set[str]] = set()
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -85,15 +89,24 @@ class TaskOperator:
     def _look(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if event.type == "ESC" and event.value == "PRESS":
             self._task.cancel()
-            return {"RUNNING_MODAL"}
+            return self._end(context) if self._task.wait(CANCEL_SECONDS) else {"RUNNING_MODAL"}
         if event.type != "TIMER":
             return {"PASS_THROUGH"}
         if self._task.done:
             return self._end(context)
-        self.advance(context)
-        context.workspace.status_text_set(f"{self._task.status}   {self._task.progress:.0%}   Esc: Cancel")
-        redraw(PANELS)
+        self._show_progress(context)
         return {"PASS_THROUGH"}
+
+    def _show_progress(self, context: bpy.types.Context) -> None:
+        """Bring status bar and panels up to date. Only where something is new: redraws are what costs time here."""
+        shown = (self._task.status, f"{self._task.progress:.0%}")
+        if shown == self._shown:
+            return
+        has_other_rows = shown[0] != self._shown[0]
+        self._shown = shown
+        self.advance(context)
+        context.workspace.status_text_set("   ".join((*shown, "Esc: Cancel")))
+        (redraw_settled if has_other_rows else redraw)(PANELS)
 
     def cancel(self, context: bpy.types.Context) -> None:
         """Blender ends the operator: another file is loaded, or the window closes."""
@@ -121,7 +134,7 @@ class TaskOperator:
         """Take over the results and report how it went. What was finished before a cancel or an error is kept."""
         self._release(context)
         self.advance(context)
-        redraw(VIEWS)
+        redraw_settled(VIEWS)
         if self._task.cancelled:
             self.report({"WARNING"}, "Cancelled")
             return {"CANCELLED"}
