@@ -1,0 +1,98 @@
+//! Espalier against Embree on the same rays, in one process, in turns. For development only: `tests/bench/run.py`
+//! writes the plans, starts this, and shows what it prints, one JSON object a line.
+//!
+//! `espalier-bench race PLAN.json` measures; `espalier-bench hits PLAN.json` only counts the hits of the plan's
+//! rays, without Embree; `espalier-bench work PLAN.json CLASS METHOD REPEATS` does what a class times, without
+//! Embree: the difference between two numbers of repeats is what instruments can count.
+
+mod arena;
+mod camera;
+mod embree;
+mod error;
+mod plan;
+mod race;
+mod rays;
+mod rivals;
+mod row;
+mod scene;
+mod verify;
+
+use std::{path::Path, process::ExitCode};
+
+use error::Error;
+use espalier_core::Method;
+use plan::{Kind, Plan, Query};
+use serde_json::json;
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let result = match arguments[..] {
+        ["race", plan] => Plan::read(Path::new(plan)).and_then(|plan| race(&plan)),
+        ["hits", plan] => Plan::read(Path::new(plan)).and_then(|plan| hits(&plan)),
+        ["work", plan, class, method, repeats] => {
+            Plan::read(Path::new(plan)).and_then(|plan| work(&plan, class, method, repeats))
+        }
+        _ => Err(Error::Plan("the arguments are: race PLAN, hits PLAN, or work PLAN CLASS METHOD REPEATS".into())),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("espalier-bench: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn race(plan: &Plan) -> Result<(), Error> {
+    let library = plan.library.as_deref().ok_or_else(|| Error::Plan("racing needs the library of Embree".into()))?;
+    let embree = embree::Embree::load(library)?;
+    let devices = rivals::devices(&embree, plan)?;
+    let scene = scene::Scene::read(plan)?;
+    let arena = arena::Arena::new(&scene, &devices);
+    for class in &plan.classes {
+        for row in arena.measure(class)? {
+            println!("{}", serde_json::to_string(&row).expect("rows are plain data"));
+        }
+    }
+    Ok(())
+}
+
+/// How many rays each class has, and how many of them hit.
+fn hits(plan: &Plan) -> Result<(), Error> {
+    let scene = scene::Scene::read(plan)?;
+    let built = scene::Built::new(&scene);
+    for class in plan.classes.iter().filter(|class| matches!(class.kind, Kind::Batch | Kind::Single)) {
+        for name in &class.methods {
+            let rays = scene.rays(class.rays, &built)?;
+            let mut answer = rivals::Answer::new(rays.len());
+            let ours = built.get(Method::from_name(name)?)?;
+            arena::trace_ours(&ours, &rays, class, plan.threads, &mut answer)?;
+            let hits = match class.query {
+                Query::Closest => answer.hits.t.iter().filter(|t| t.is_finite()).count(),
+                Query::Any => answer.blocked.iter().filter(|&&blocked| blocked).count(),
+            };
+            let row = json!({"class": class.name, "method": name, "rays": rays.len(), "hits": hits});
+            println!("{row}");
+        }
+    }
+    Ok(())
+}
+
+/// Do what a class times, `repeats` times.
+fn work(plan: &Plan, class: &str, method: &str, repeats: &str) -> Result<(), Error> {
+    let repeats: usize = repeats.parse().map_err(|_| Error::Plan(format!("'{repeats}' is no number of repeats")))?;
+    let missing = || Error::Plan(format!("the plan has no class {class}"));
+    let class = plan.classes.iter().find(|known| known.name == class).ok_or_else(missing)?;
+    let (scene, method) = (scene::Scene::read(plan)?, Method::from_name(method)?);
+    let built = scene::Built::new(&scene);
+    let rays = scene.rays(class.rays, &built)?;
+    let mut answer = rivals::Answer::new(rays.len());
+    for _ in 0..repeats {
+        match class.kind {
+            Kind::Build => drop(scene.build(scene.mesh.clone(), method)?),
+            _ => arena::trace_ours(&*built.get(method)?, &rays, class, plan.threads, &mut answer)?,
+        }
+    }
+    Ok(())
+}
