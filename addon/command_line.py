@@ -172,7 +172,8 @@ def _blender() -> Iterator[None]:
     finally:
         if registered_here:
             unregister_addon()
-        signal.signal(signal.SIGINT, before)
+        if before is not None:  # None: Blender's own handler, in C, which Python cannot put back; Blender ends now
+            signal.signal(signal.SIGINT, before)
 
 
 def _expected_errors() -> tuple[type[Exception], ...]:

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from .blender import SCRIPTS, Blender
 
 SIZE = (1600, 1000)
-REST = (SIZE[0] - 480, 12)
-"""Where no button is: the empty part of the top bar."""
-REDRAW_SECONDS = 0.5
-"""What software OpenGL takes to draw the whole window, with room to spare."""
+REST = (SIZE[0] // 2, SIZE[1] - 6)
+"""Where no button is: the empty part of the status bar."""
+SETTLE_SECONDS = 20.0
+"""Longest that software OpenGL may take to draw what is asked for, on a busy machine."""
 
 
 def wait_until(condition: Callable[[], Any], seconds: float, what: str, interval: float = 0.1) -> Any:
@@ -120,11 +120,30 @@ class Desktop:
         """Press and release a key, by its X name."""
         self._xdotool("key", name)
 
+    def answer_seconds(self) -> float:
+        """The slowest of some answers: what the interface and this harness take now, without any work."""
+        slowest = 0.0
+        for _ in range(5):
+            asked = time.monotonic()
+            self.python("value = True")
+            slowest = max(slowest, time.monotonic() - asked)
+        return slowest
+
     def screenshot(self, name: str) -> NDArray[np.uint8]:
-        """The whole screen as (height, width, 3), also kept as NAME.png in the folder."""
-        self.python("for area in window.screen.areas:\n    area.tag_redraw()")
-        time.sleep(REDRAW_SECONDS)
+        """The whole screen as it is now, (height, width, 3), also kept as NAME.png in the folder."""
         path = self.folder / f"{name}.png"
         subprocess.run(["import", "-window", "root", path], env=self.environment, check=True)
         raw = subprocess.run(["convert", path, "-depth", "8", "rgb:-"], capture_output=True, check=True).stdout
         return np.frombuffer(raw, np.uint8).reshape(SIZE[1], SIZE[0], 3)
+
+    def settled(self, name: str) -> NDArray[np.uint8]:
+        """The screen once everything is drawn anew and two screenshots in a row are the same."""
+        self.python("for area in window.screen.areas:\n    area.tag_redraw()")
+        last = self.screenshot(name)
+        deadline = time.monotonic() + SETTLE_SECONDS
+        while time.monotonic() < deadline:
+            time.sleep(0.4)
+            last, before = self.screenshot(name), last
+            if np.array_equal(last, before):
+                return last
+        raise AssertionError(f"the screen does not come to rest: {name}")

@@ -36,7 +36,8 @@ def main() -> None:
     assert np.abs(cube - corner).max() > 0.01, f"the cube {cube} stands out from the world {corner}"
     bpy.ops.preferences.addon_disable(module=MODULE)
     assert not hasattr(bpy.types.Scene, "espalier")
-    assert "ESPALIER" not in {cls.bl_idname for cls in bpy.types.RenderEngine.__subclasses__() if cls.is_registered}
+    engines = [cls for cls in bpy.types.RenderEngine.__subclasses__() if cls.__module__.startswith(MODULE)]
+    assert not any(cls.is_registered for cls in engines)
     print(f"bpy {bpy.app.version_string}: installed, rendered, disabled")
 
 
