@@ -82,12 +82,17 @@ impl Walk {
         walk
     }
 
-    /// The parameter at which the ray leaves the current cell along `axis`.
+    /// The parameter at which the ray leaves the current cell along `axis`. Behind the grid's last plane there is no
+    /// cell that would make up for a rounding error, so the grid ends where its dilated box does.
     #[inline(always)]
     fn crossing(&self, axis: usize, frame: &Frame, grid: &Grid) -> f32 {
         let plane = self.cell[axis] + i32::from(self.step[axis] > 0);
         let position = grid.lower[axis] + plane as f32 * grid.cell[axis];
-        (position - frame.local[axis]) * frame.inverse[axis]
+        if plane == 0 || plane == grid.resolution[axis] as i32 {
+            position * frame.inverse[axis] + frame.far_bias[axis]
+        } else {
+            (position - frame.local[axis]) * frame.inverse[axis]
+        }
     }
 
     /// The axis along which the ray leaves the current cell first.
