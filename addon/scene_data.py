@@ -54,8 +54,8 @@ class LightData(_Arguments):
     """A light in Blender's units; `matrix` is light to world, and it shines along its local -Z.
 
     power: watts (sun: watts per square metre), exposure already applied. radius: metres (point, spot), of a disk that
-    faces the lit point where soft_falloff, else of a sphere. angle: radians (sun). spot_size: radians of the full cone. size, size_y: metres (area), scaled by the matrix.
-    spread: radians (area).
+    faces the lit point where soft_falloff, else of a sphere. angle: radians (sun). spot_size: radians of the full cone.
+    size, size_y: metres (area), scaled by the matrix. spread: radians (area).
     """
 
     name: str

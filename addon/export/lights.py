@@ -31,7 +31,7 @@ def read_light(light: Light, matrix: Any, name: str, notes: Notes) -> LightData:
 
 
 def _sphere(light: Light) -> dict[str, Any]:
-    return {"radius": light.shadow_soft_size, "soft_falloff": light.use_soft_falloff}
+    return {"radius": light.shadow_soft_size, "soft_falloff": getattr(light, "use_soft_falloff", True)}
 
 
 def _spot(light: Light) -> dict[str, Any]:
