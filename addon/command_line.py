@@ -6,11 +6,13 @@ Ctrl C. Any other end is a bug, and shows its traceback.
 
 import argparse
 import contextlib
+import os
+import shutil
 import signal
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any, NoReturn, TextIO
+from typing import Any, NoReturn
 
 from . import catalogue, input_kinds
 from .errors import EspalierAddonError
@@ -37,12 +39,27 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         options = _parser().parse_args(sys.argv[1:] if arguments is None else list(arguments))
         return int(options.run(options))
+    except SystemExit as ended:  # argparse's way to end after --help, which must not end Blender
+        return int(ended.code or 0)
     except KeyboardInterrupt:
         print("espalier: interrupted", file=sys.stderr)
         return INTERRUPTED_STATUS
     except _expected_errors() as error:
         print(f"espalier: {error}", file=sys.stderr)
         return USAGE_STATUS
+
+
+def console() -> NoReturn:
+    """The command as a shell starts it: `main`, and out of the process.
+
+    A plain exit takes the bpy module apart, which can hang, and tells of memory it did not free.
+    """
+    status = main()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    if "bpy" in sys.modules:
+        shutil.rmtree(sys.modules["bpy"].app.tempdir, ignore_errors=True)
+    os._exit(status)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -104,7 +121,7 @@ def _compare(options: argparse.Namespace) -> int:
     input_kinds.check(options.input)
     folder = options.out or Path("out") / Path(options.input).stem
     with OutputFolder(folder) as outputs, own_streams() as (stdout, stderr), _blender():
-        outcome, notes = _trace(options, stderr)
+        outcome, notes = _trace(options, ProgressLine(stdout, stderr))
         outputs.publish(_writers(outcome))
         stdout.write(f"\n{outcome.report.table()}")
         stdout.writelines(f"Note: {note}\n" for note in notes)
@@ -112,12 +129,11 @@ def _compare(options: argparse.Namespace) -> int:
     return 0
 
 
-def _trace(options: argparse.Namespace, stderr: TextIO) -> tuple[Any, list[str]]:
+def _trace(options: argparse.Namespace, line: ProgressLine) -> tuple[Any, list[str]]:
     """The outcome of the comparison, and notes on what was added to the scene or left out of it."""
     from . import compare, inputs
     from .run import Options
 
-    line = ProgressLine(stderr)
     try:
         line.update(0.0, f"Open {options.input}")
         opened = inputs.open_input(

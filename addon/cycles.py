@@ -54,7 +54,7 @@ class Job:
 def command(binary: str, python: str) -> tuple[str, ...]:
     """How to start the worker: with Blender's binary, or where there is none (the bpy module) with Python."""
     if binary:
-        return (binary, "--background", "--factory-startup", "--python-exit-code", "3", "--python", str(WORKER), "--")
+        return (binary, "--background", "--factory-startup", "--python", str(WORKER), "--")
     return (python, "-P", str(WORKER), "--")  # -P: beside the script lie modules whose names Blender's own have
 
 
@@ -77,6 +77,7 @@ class SecondBlender:
             stderr=subprocess.STDOUT,
             encoding="utf-8",
             errors="replace",
+            env=os.environ | {name: str(folder) for name in ("TMPDIR", "TEMP", "TMP")},  # a kill cleans nothing up
             start_new_session=os.name == "posix",  # Ctrl C is the parent's to answer
             creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
         )

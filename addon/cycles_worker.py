@@ -12,6 +12,7 @@ import re
 import sys
 import threading
 import time
+import traceback
 from pathlib import Path
 from typing import Any
 
@@ -140,5 +141,12 @@ def _end_with_parent() -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[sys.argv.index("--") + 1])
-    os._exit(0)  # a plain exit waits for the thread that reads stdin
+    status = 1
+    try:
+        main(sys.argv[sys.argv.index("--") + 1])
+        status = 0
+    except BaseException:  # noqa: BLE001 - shown, and told by the status
+        traceback.print_exc()
+    finally:
+        sys.stderr.flush()
+        os._exit(status)  # a plain exit waits for the thread that reads stdin

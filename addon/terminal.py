@@ -15,11 +15,11 @@ REDRAW_SECONDS = 0.1
 
 
 class ProgressLine:
-    """A bar that redraws itself in place; where the stream is no terminal, one line for each new status."""
+    """A bar on stderr that redraws itself in place; where that is no terminal, a line on stdout for each new status."""
 
-    def __init__(self, stream: TextIO) -> None:
-        self._stream = stream
-        self._live = stream.isatty()
+    def __init__(self, stdout: TextIO, stderr: TextIO) -> None:
+        self._live = stderr.isatty()
+        self._stream = stderr if self._live else stdout
         self._start = time.monotonic()
         self._drawn = 0.0
         self._last = ""

@@ -1,4 +1,4 @@
-"""The Cornell box: few large triangles, coloured walls, one lamp. No bpy.
+"""The Cornell box: few large triangles, coloured walls, one lamp and a weak one before it. No bpy.
 
 Laid out after the box of Goral and others 1984 at its measured size of 5.5 m (in the original: 5.5 units); the tall
 block is a mirror.
@@ -34,7 +34,10 @@ def stage(seed: int) -> Stage:
             Part("Short Block", _block((3.7, 1.7), 1.65, low - 0.3, -0.3), white),
             Part("Tall Block", _block((1.85, 3.7), 1.65, high - 0.25, 0.62), Surface("Mirror", (0.95,) * 3, 1.0, 0.0)),
         ],
-        lights=[Light("area", (2.75, 2.75, EDGE - 0.05), (2.75, 2.75, 0), power=260, size=1.2, color=(1.0, 0.9, 0.75))],
+        lights=[
+            Light("area", (2.75, 2.75, EDGE - 0.05), (2.75, 2.75, 0), power=260, size=1.2, color=(1.0, 0.9, 0.75)),
+            Light("area", (2.75, -4.5, 3.6), (2.75, 2.75, 2.75), power=150, size=3.0),
+        ],
         view=View((2.75, -7.6, 2.75), (2.75, 2.75, 2.75), 47.0),
         world=(0.0, 0.0, 0.0),
     )

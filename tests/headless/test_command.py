@@ -1,0 +1,165 @@
+"""The command in a process of its own, as a shell starts it."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import bpy
+import pytest
+from PIL import Image
+
+ROOT = Path(__file__).resolve().parents[2]
+PRELUDE = f"""
+import runpy, sys
+runpy.run_path({str(ROOT / "tests" / "conftest.py")!r})
+from espalier.command_line import console
+console()
+"""
+CUBE = """o Cube
+v -1 -1 -1
+v 1 -1 -1
+v 1 1 -1
+v -1 1 -1
+v -1 -1 1
+v 1 -1 1
+v 1 1 1
+v -1 1 1
+f 4 3 2 1
+f 5 6 7 8
+f 1 2 6 5
+f 2 3 7 6
+f 3 4 8 7
+f 4 1 5 8
+"""
+
+
+def command(*arguments: object) -> list[str]:
+    return [sys.executable, "-c", PRELUDE, *map(str, arguments)]
+
+
+def run(*arguments: object) -> "subprocess.CompletedProcess[str]":
+    return subprocess.run(command(*arguments), capture_output=True, text=True, check=False, timeout=120)
+
+
+def test_compare_writes_pictures_and_report_and_prints_the_table(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    done = run("compare", "cornell_box", "--resolution", "64x48", "--threads", 1, "--out", out)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert {path.name for path in out.iterdir()} == {
+        "compare.png",
+        "espalier.png",
+        "cycles.png",
+        "difference.png",
+        "report.json",
+    }
+    report = json.loads((out / "report.json").read_text())
+    assert report["image"] == {"width": 64, "height": 48, "samples": 1}
+    for name in ("espalier", "cycles", "difference"):
+        with Image.open(out / f"{name}.png") as picture:
+            assert picture.size == (64, 48)
+    lines = done.stdout.splitlines()
+    assert all(any(f"({method['name']})" in line for line in lines) for method in report["methods"])
+    assert lines[-1] == f"Pictures and report: {out}"
+    assert "Info:" not in done.stdout
+
+
+def test_a_bare_mesh_gets_camera_and_light_and_says_so(tmp_path: Path) -> None:
+    (tmp_path / "cube.obj").write_text(CUBE)
+    out = tmp_path / "out"
+    done = run(
+        "compare", tmp_path / "cube.obj", "--methods", "grid", "--no-cycles", "--resolution", "40x40", "--out", out
+    )
+    assert done.returncode == 0, done.stderr
+    assert "Note: There is no camera: one was framed on everything that renders" in done.stdout
+    assert "Note: There is no light: two suns and a grey world were added" in done.stdout
+    assert {path.name for path in out.iterdir()} == {"espalier.png", "report.json"}
+    report = json.loads((out / "report.json").read_text())
+    assert (report["scene"]["name"], report["scene"]["triangles"]) == ("cube", 12)
+    with Image.open(out / "espalier.png") as picture:
+        shades = {picture.getpixel((20, 20)), picture.getpixel((1, 1))}
+    assert len(shades) == 2
+
+
+def test_a_blend_is_traced_at_its_own_size_and_the_frame_asked_for(tmp_path: Path, scene: bpy.types.Scene) -> None:
+    data = bpy.data.meshes.new("Quad")
+    data.from_pydata([(-1, 0, -1), (1, 0, -1), (1, 0, 1), (-1, 0, 1)], [], [(0, 1, 2, 3)])
+    quad = bpy.data.objects.new("Quad", data)
+    scene.collection.objects.link(quad)
+    quad.location.x = 0
+    quad.keyframe_insert("location", frame=1)
+    quad.location.x = 100
+    quad.keyframe_insert("location", frame=10)
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.location, camera.rotation_euler = (0, -5, 0), (1.5707963, 0, 0)
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = 80, 60, 50
+    sun = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
+    sun.rotation_euler = (1.2, 0, 0)
+    scene.collection.objects.link(sun)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "moving.blend"), copy=True)
+    middles = []
+    for frame in (1, 10):
+        out = tmp_path / str(frame)
+        options = ("--methods", "bvh-sah", "--no-cycles", "--frame", frame, "--out", out)
+        done = run("compare", tmp_path / "moving.blend", *options)
+        assert done.returncode == 0, done.stderr
+        with Image.open(out / "espalier.png") as picture:
+            assert picture.size == (40, 30)
+            middles.append(picture.getpixel((20, 15)))
+    assert middles[0] != middles[1]
+
+
+@pytest.mark.parametrize(
+    "name", ["junk.blend", "junk.ply", "junk.obj", "junk.stl", "junk.glb", "empty.obj", "empty.ply"]
+)
+def test_a_broken_file_is_one_line_and_status_2(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_text("" if name.startswith("empty") else "garbage\n")
+    out = tmp_path / "a" / "out"
+    done = run("compare", tmp_path / name, "--out", out)
+    assert done.returncode == 2
+    assert done.stderr.startswith("espalier: ")
+    assert done.stderr.count("\n") == 1
+    assert name in done.stderr
+    assert not out.parent.exists()
+
+
+def test_a_folder_that_cannot_be_written_is_one_line_and_status_2(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    done = run("compare", "cornell_box", "--out", tmp_path / "file" / "out")
+    assert done.returncode == 2
+    assert done.stderr.startswith(f"espalier: Cannot write to {tmp_path / 'file' / 'out'}")
+    assert done.stderr.count("\n") == 1
+
+
+def children(process: int) -> list[str]:
+    """Command lines of the living processes that have this parent."""
+    found = subprocess.run(["ps", "-o", "args=", "--ppid", str(process)], capture_output=True, text=True, check=False)
+    return found.stdout.splitlines()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="Ctrl C is a POSIX signal here")
+@pytest.mark.parametrize("when", ["Uniform Grid: trace", "Cycles"])
+def test_ctrl_c_ends_with_130_and_leaves_nothing(tmp_path: Path, when: str) -> None:
+    out = tmp_path / "out"
+    samples = 30_000 if when.startswith("Uniform") else 6
+    arguments = ("compare", "cornell_box", "--methods", "grid", "--samples", samples, "--resolution", "256x256")
+    process = subprocess.Popen(
+        command(*arguments, "--out", out), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    for line in process.stdout:
+        if line.strip() == when:
+            break
+    if when == "Cycles":
+        deadline = time.monotonic() + 30
+        while not any("cycles_worker" in line for line in children(process.pid)) and time.monotonic() < deadline:
+            time.sleep(0.05)
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=20)
+    assert process.returncode == 130
+    assert err == "espalier: interrupted\n"
+    assert list(tmp_path.iterdir()) == []
