@@ -12,12 +12,22 @@ from bpy.props import (
     PointerProperty,
 )
 
+from .areas import redraw
 from .methods import DEFAULT_METHOD, METHOD_NAMES, METHODS
 
 METHOD_ITEMS = [(method.name, method.label, method.description, index) for index, method in enumerate(METHODS)]
 METHOD_FLAGS = [(method.name, method.label, method.description, 1 << index) for index, method in enumerate(METHODS)]
 STATIC: Any = set()
 """Property options of a setting that cannot be animated."""
+
+
+def _redraw(_settings: bpy.types.PropertyGroup, _context: bpy.types.Context) -> None:
+    """Show a change that a script made, too: Blender redraws by itself only for changes in its interface."""
+    redraw(frozenset({"VIEW_3D", "PROPERTIES"}))
+
+
+DRAWN: Any = {"options": STATIC, "update": _redraw}
+"""Property arguments of what the overlay draws."""
 
 
 def color(name: str, description: str, default: tuple[float, float, float]) -> Any:
@@ -30,7 +40,7 @@ def color(name: str, description: str, default: tuple[float, float, float]) -> A
         max=1.0,
         size=3,
         subtype="COLOR_GAMMA",
-        options=STATIC,
+        **DRAWN,
     )
 
 
@@ -41,21 +51,21 @@ class ESPALIER_PG_overlay(bpy.types.PropertyGroup):
         name="Show Cells",
         description="Draw the boxes of the accelerator last built over the 3D viewport",
         default=True,
-        options=STATIC,
+        **DRAWN,
     )
     method: EnumProperty(
         name="Method",
         description="Acceleration method whose boxes are drawn, once it is built",
         items=METHOD_ITEMS,
         default=DEFAULT_METHOD,
-        options=STATIC,
+        **DRAWN,
     )
-    branches: BoolProperty(name="Branches", description="Draw the boxes of inner nodes", default=False, options=STATIC)
+    branches: BoolProperty(name="Branches", description="Draw the boxes of inner nodes", default=False, **DRAWN)
     leaves: BoolProperty(
-        name="Leaves", description="Draw the boxes of nodes that hold triangles", default=True, options=STATIC
+        name="Leaves", description="Draw the boxes of nodes that hold triangles", default=True, **DRAWN
     )
-    grids: BoolProperty(name="Grids", description="Draw the outer boxes of uniform grids", default=True, options=STATIC)
-    cells: BoolProperty(name="Grid Cells", description="Draw the cells of uniform grids", default=True, options=STATIC)
+    grids: BoolProperty(name="Grids", description="Draw the outer boxes of uniform grids", default=True, **DRAWN)
+    cells: BoolProperty(name="Grid Cells", description="Draw the cells of uniform grids", default=True, **DRAWN)
     branch_color: color("Branch Color", "Color of the boxes of inner nodes", (0.95, 0.95, 0.95))
     leaf_color: color("Leaf Color", "Color of the boxes of nodes that hold triangles", (0.25, 0.69, 1.0))
     grid_color: color("Grid Color", "Color of the outer boxes of uniform grids", (1.0, 0.48, 0.72))
@@ -67,7 +77,7 @@ class ESPALIER_PG_overlay(bpy.types.PropertyGroup):
         min=0,
         max=65535,
         soft_max=64,
-        options=STATIC,
+        **DRAWN,
     )
     depth_max: IntProperty(
         name="Depth Max",
@@ -76,13 +86,13 @@ class ESPALIER_PG_overlay(bpy.types.PropertyGroup):
         min=0,
         max=65535,
         soft_max=64,
-        options=STATIC,
+        **DRAWN,
     )
     occupied_only: BoolProperty(
-        name="Occupied Only", description="Leave out boxes that hold no triangle", default=True, options=STATIC
+        name="Occupied Only", description="Leave out boxes that hold no triangle", default=True, **DRAWN
     )
     in_front: BoolProperty(
-        name="In Front", description="Draw the boxes in front of all objects", default=False, options=STATIC
+        name="In Front", description="Draw the boxes in front of all objects", default=False, **DRAWN
     )
     opacity: FloatProperty(
         name="Opacity",
@@ -91,7 +101,7 @@ class ESPALIER_PG_overlay(bpy.types.PropertyGroup):
         min=0.0,
         max=1.0,
         subtype="FACTOR",
-        options=STATIC,
+        **DRAWN,
     )
     max_boxes: IntProperty(
         name="Max Boxes",
@@ -100,7 +110,7 @@ class ESPALIER_PG_overlay(bpy.types.PropertyGroup):
         min=1,
         soft_max=1_000_000,
         max=10_000_000,
-        options=STATIC,
+        **DRAWN,
     )
 
 

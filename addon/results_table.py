@@ -1,5 +1,6 @@
 """The results table as texts: what each cell says, and which is the best of its column. No bpy."""
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -55,6 +56,11 @@ def cells(rows: Sequence[Row], column: Column) -> list[Cell]:
     return [Cell(form(value), best is not None and value == best) for value in values]
 
 
+def rows_for(rows: Sequence[Row], columns: Sequence[Column]) -> list[Row]:
+    """The rows that these columns have: Cycles has times, but no size."""
+    return [row for row in rows if row.method != CYCLES or any(column in TIMES[:2] for column in columns)]
+
+
 def method_text(method: str, *, short: bool = False) -> str:
     """A method's name, Cycles among them."""
     if method == CYCLES:
@@ -89,8 +95,7 @@ def byte_text(value: float | None) -> str:
 def _three_digits(value: float) -> str:
     if value == int(value) or value >= 99.95:
         return f"{value:.0f}"
-    if value >= 9.995:
-        return f"{value:.1f}"
-    if value >= 0.9995:
-        return f"{value:.2f}"
-    return f"{value:.3g}" if value >= 0.0005 else f"{value:.1e}"
+    if value < 0.0005:
+        return f"{value:.1e}"
+    rounded = float(f"{value:.2e}")
+    return f"{rounded:.{2 - math.floor(math.log10(rounded))}f}"

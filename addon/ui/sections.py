@@ -10,8 +10,12 @@ from .. import overlay, results
 from .. import results_table as table
 from ..operators import task
 
-WIDE = 520
-"""Pixels, at a scale of 1, from which all columns of the results fit side by side."""
+TABLES = (
+    (520, (table.TIMES + table.SIZES,)),
+    (290, (table.TIMES, table.SIZES)),
+    (0, (table.TIMES[:2], (table.TIMES[2], table.SIZES[0]), table.SIZES[1:])),
+)
+"""From which width of the panel, in pixels at a scale of 1, which columns fit side by side; the rest go below."""
 
 MOST_NOTES = 6
 """Most notes shown in a panel."""
@@ -76,27 +80,28 @@ def draw_advanced(layout: Layout, settings: Any) -> None:
 
 
 def draw_results(layout: Layout, context: bpy.types.Context) -> None:
-    """The table: all columns side by side in a wide panel, times above sizes in a narrow one."""
+    """The table, in as many parts as the panel is narrow for it."""
     rows = results.of(context.scene.session_uid).rows
     if not rows:
         layout.label(text="Nothing traced yet")
         return
-    if panel_width(context) >= WIDE:
-        _draw_table(layout, rows, table.TIMES + table.SIZES, short=False)
-    else:
-        _draw_table(layout, rows, table.TIMES, short=True)
-        _draw_table(layout, rows, table.SIZES, short=True)
+    width = panel_width(context)
+    tables = next(tables for least, tables in TABLES if width >= least)
+    for columns in tables:
+        _draw_table(layout, rows, columns, short=len(tables) > 1)
     layout.operator("espalier.clear_results", icon="TRASH")
 
 
 def _draw_table(layout: Layout, rows: Sequence[results.Row], columns: Sequence[table.Column], *, short: bool) -> None:
-    row = layout.box().row()
-    names = row.column(align=True)
+    rows = table.rows_for(rows, columns)
+    split = layout.box().split(factor=1.3 / (len(columns) + 1.3), align=True)
+    names = split.column(align=True)
     names.label(text="")
     for entry in rows:
         names.label(text=table.method_text(entry.method, short=short))
+    numbers = split.row(align=True)
     for column in columns:
-        _draw_column(row.column(align=True), rows, column)
+        _draw_column(numbers.column(align=True), rows, column)
 
 
 def _draw_column(layout: Layout, rows: Sequence[results.Row], column: table.Column) -> None:

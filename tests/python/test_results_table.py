@@ -38,6 +38,11 @@ def test_equal_ones_are_both_best_and_a_lone_one_is_not():
     assert best("build_ms", (Row("grid", 1.0, 1.0), Row("bvh-sah"))) == [False, False]
 
 
+def test_cycles_is_where_it_has_numbers():
+    assert [row.method for row in table.rows_for(ROWS, table.TIMES)] == ["bvh-median", "grid", CYCLES]
+    assert [row.method for row in table.rows_for(ROWS, table.SIZES)] == ["bvh-median", "grid"]
+
+
 def test_what_is_not_known_is_a_dash():
     assert [cell.text for cell in table.cells(ROWS, column("nodes"))] == ["1000", "1", "\N{EN DASH}"]
 
@@ -48,6 +53,7 @@ def test_what_is_not_known_is_a_dash():
         (0, "0"),
         (7, "7"),
         (0.0123456, "0.0123"),
+        (0.35, "0.350"),
         (0.9996, "1.00"),
         (1.0 / 3, "0.333"),
         (9.996, "10.0"),
