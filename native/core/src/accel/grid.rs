@@ -21,14 +21,25 @@ pub struct BuiltGrid {
 
 /// Cells along each axis for `count` triangles in a box: in all about `density * count`, as near to cubes as whole
 /// numbers allow (Ize, Shirley and Parker, "Grid Creation Strategies for Efficient Ray Tracing", RT 2007).
+///
+/// An axis along which the box is thinner than such a cube gets one cell, and the others share the cells anew.
 pub fn resolution(bounds: &Bounds, count: usize, density: f64, most_cells: usize) -> [u32; 3] {
     let extent = bounds.extent().as_dvec3();
-    let longest = extent.max_element().max(f64::MIN_POSITIVE);
     let wanted = (density * count as f64).clamp(1.0, most_cells as f64);
-    // A flat box is given a thickness below any cell's, so that its volume is not zero.
-    let ratio = (extent / longest).max(glam::DVec3::splat(1e-6 / wanted));
-    let per_unit = (wanted / (ratio.x * ratio.y * ratio.z)).cbrt();
-    let mut cells = ratio.to_array().map(|r| (r * per_unit).floor().clamp(1.0, 4096.0));
+    let mut axes: Vec<usize> = (0..3).filter(|&k| extent[k] > 0.0).collect();
+    let mut cells = [1.0; 3];
+    while !axes.is_empty() {
+        // The mean of logarithms: a product of three extents may leave the range of numbers.
+        let mean = (wanted.ln() - axes.iter().map(|&k| extent[k].ln()).sum::<f64>()) / axes.len() as f64;
+        // Rounding must not make 1.999.. of 2.
+        let along = |k: usize| extent[k] * mean.exp() + 1e-9;
+        let before = axes.len();
+        axes.retain(|&k| along(k) >= 1.0);
+        if axes.len() == before {
+            axes.iter().for_each(|&k| cells[k] = along(k).floor().min(4096.0));
+            break;
+        }
+    }
     while cells.iter().product::<f64>() > most_cells as f64 {
         let longest = (0..3).max_by(|&a, &b| cells[a].total_cmp(&cells[b])).unwrap_or(0);
         cells[longest] = (cells[longest] / 2.0).floor().max(1.0);
@@ -152,5 +163,30 @@ impl Raster {
 
     fn index(&self, [x, y, z]: [u32; 3]) -> u32 {
         (z * self.grid.resolution[1] + y) * self.grid.resolution[0] + x
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cells_of(extent: [f32; 3], count: usize) -> [u32; 3] {
+        let bounds = Bounds { lower: Vec3::ZERO, upper: Vec3::from_array(extent) };
+        resolution(&bounds, count, 1.0, 1 << 24)
+    }
+
+    #[test]
+    fn cells_are_cubes_and_as_many_as_wanted() {
+        assert_eq!(cells_of([1.0; 3], 1000), [10; 3]);
+        assert_eq!(cells_of([4.0, 2.0, 1.0], 8000), [40, 20, 10]);
+        assert_eq!(cells_of([1e-30, 2e-30, 1e-30], 2000), [10, 20, 10]);
+    }
+
+    #[test]
+    fn a_flat_box_has_no_more_cells_than_others() {
+        assert_eq!(cells_of([1.0, 1.0, 0.0], 10_000), [100, 100, 1]);
+        assert_eq!(cells_of([1e-6, 2.0, 1.0], 20_000), [1, 200, 100]);
+        assert_eq!(cells_of([0.0, 3.0, 0.0], 77), [1, 77, 1]);
+        assert_eq!(cells_of([0.0; 3], 77), [1; 3]);
     }
 }
