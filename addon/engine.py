@@ -64,9 +64,12 @@ class ESPALIER_RenderEngine(bpy.types.RenderEngine):
 
     def _watch(self, run: Run) -> None:
         """Show progress until the run ends; Esc cancels it."""
+        told = ""
         while not run.wait(POLL_SECONDS):
             self.update_progress(run.progress)
-            self.update_stats("", f"Espalier: {run.status}")
+            if run.status != told:  # without a window each telling is a line of output
+                told = run.status
+                self.update_stats("", f"Espalier: {told}")
             if self._stopped():
                 run.cancel()
 

@@ -2,6 +2,7 @@
 
 import threading
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
@@ -25,6 +26,8 @@ def _renders_with_espalier(scene, tmp_path):
     settings = render.image_settings
     if hasattr(settings, "media_type"):
         settings.media_type = "MULTI_LAYER_IMAGE"
+    if hasattr(settings, "use_exr_interleave"):  # one part for all passes, as before 5.0
+        settings.use_exr_interleave = True
     settings.file_format, settings.color_depth, settings.exr_codec = "OPEN_EXR_MULTILAYER", "32", "NONE"
     render.filepath = str(tmp_path / "frame")
     building.camera(type="ORTHO", ortho_scale=4.0)
@@ -178,26 +181,31 @@ def test_esc_ends_a_render_in_time(scene, monkeypatch):
     bpy.ops.object.light_add(type="SUN")
     scene.render.resolution_x = scene.render.resolution_y = 1024
     scene.espalier.samples = 10_000
-    asked: list[float] = []
-
-    def stopped(self) -> bool:
-        asked.append(time.perf_counter())
-        return len(asked) >= 5
-
-    monkeypatch.setattr(engine.ESPALIER_RenderEngine, "_stopped", stopped)
-    ends = []
+    monkeypatch.setattr(engine.ESPALIER_RenderEngine, "_stopped", lambda self: next(answers))
+    delays = []
     watch = engine.ESPALIER_RenderEngine._watch
 
     def timed_watch(self, run) -> None:
         watch(self, run)
-        ends.append(time.perf_counter())
+        delays.append(time.perf_counter() - pressed[0])
 
     monkeypatch.setattr(engine.ESPALIER_RenderEngine, "_watch", timed_watch)
-    bpy.ops.render.render()
-    assert len(asked) >= 5, "the render was over before it could be cancelled"
-    # 0.2 s is the promise; the rest is room for a machine that is busy with other things.
-    assert ends[0] - asked[4] < 0.2 + 0.3
+    # A machine that is busy with other things may delay one end, not each of three.
+    for _ in range(3):
+        pressed: list[float] = []
+        answers = _esc_at_the_fifth_look(pressed)
+        bpy.ops.render.render()
+        assert pressed, "the render was over before it could be cancelled"
+    assert min(delays) < 0.2
     assert not [thread for thread in threading.enumerate() if thread.name == "espalier-run"]
+
+
+def _esc_at_the_fifth_look(pressed: list[float]) -> Iterator[bool]:
+    """What a render learns when it asks for Esc; `pressed` gets the time at which it is first told."""
+    yield from [False] * 4
+    pressed.append(time.perf_counter())
+    while True:
+        yield True
 
 
 def test_an_error_is_reported_and_writes_no_file(scene):

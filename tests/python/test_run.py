@@ -80,17 +80,23 @@ def test_progress_never_falls_within_a_method_and_status_names_it():
 
 @pytest.mark.parametrize("delay", [0.0, 0.05, 0.5])
 def test_cancel_ends_the_thread_in_time_and_keeps_what_is_finished(delay):
-    run = Run(plane(300, (64, 64)), ["grid", "bvh-sah"], Options(samples=1 << 20)).start()
+    data = plane(300, (64, 64))
+    # A machine that is busy with other things may delay one end, not each of three.
+    assert min(_seconds_to_cancel(data, delay) for _ in range(3)) < 0.2
+    assert not [thread for thread in threading.enumerate() if thread.name == "espalier-run"]
+
+
+def _seconds_to_cancel(data: SceneData, delay: float) -> float:
+    """How long a run that would take minutes goes on after it was cancelled."""
+    run = Run(data, ["grid", "bvh-sah"], Options(samples=1 << 20)).start()
     time.sleep(delay)
     start = time.perf_counter()
     run.cancel()
-    assert run.wait(5.0)
-    # 0.2 s is the promise; the rest is room for a machine that is busy with other things.
-    assert time.perf_counter() - start < 0.2 + 0.3
+    assert run.wait(10.0)
     assert run.cancelled
     assert run.results == ()
     run.raise_error()
-    assert not [thread for thread in threading.enumerate() if thread.name == "espalier-run"]
+    return time.perf_counter() - start
 
 
 def test_an_error_of_the_core_is_raised_where_it_is_waited_for():
