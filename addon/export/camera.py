@@ -19,7 +19,8 @@ def read_camera(scene: bpy.types.Scene, name: str, notes: Notes) -> CameraData:
         raise NoCameraError(name)
     camera: Any = holder.data
     if camera.type not in KINDS:
-        raise UnsupportedCameraError(holder.name, camera.type)
+        kind = camera.bl_rna.properties["type"].enum_items[camera.type].name
+        raise UnsupportedCameraError(holder.name, kind)
     if camera.dof.use_dof:
         notes.add(f"Camera '{holder.name}': depth of field is ignored")
     render = scene.render

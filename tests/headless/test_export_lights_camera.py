@@ -162,7 +162,7 @@ def test_an_orthographic_camera_without_its_scale(scene):
 def test_a_panoramic_camera_is_a_named_error():
     building.camera(type="PANO")
     with pytest.raises(
-        UnsupportedCameraError, match=r"'Camera' is pano.*set Lens > Type to Perspective or Orthographic"
+        UnsupportedCameraError, match=r"'Camera' is panoramic, .*set Lens > Type to Perspective or Orthographic"
     ):
         building.export()
 
