@@ -6,8 +6,8 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-SETTLE_SECONDS = (0.1, 0.4)
-"""When to draw panels again after their height changed; Blender animates the move for 0.3 s."""
+SETTLE_SECONDS = (0.1, 0.4, 1.0)
+"""When to draw panels again after their height changed; Blender animates the move for 0.3 s, and may be slow."""
 
 MARK = "espalier"
 """Custom property of the images made here."""

@@ -97,7 +97,7 @@ class ESPALIER_PG_overlay(bpy.types.PropertyGroup):
     opacity: FloatProperty(
         name="Opacity",
         description="Opacity of the boxes",
-        default=0.5,
+        default=0.3,
         min=0.0,
         max=1.0,
         subtype="FACTOR",
