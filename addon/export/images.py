@@ -1,4 +1,7 @@
-"""Reads Blender images as scene-linear pixels."""
+"""Reads Blender images as scene-linear pixels.
+
+So they are filtered after they are linear, as in EEVEE. Cycles filters sRGB bytes first, which magnified pixels show.
+"""
 
 import contextlib
 from collections.abc import Iterator
