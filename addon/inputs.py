@@ -117,7 +117,7 @@ def _add_light(opened: Opened) -> None:
     if any(thing.type == "LIGHT" for thing in opened.scene.objects):
         return
     stage, blender = (catalogue.module(name) for name in ("stage", "blender"))
-    blender.add_light(opened.scene, stage.Light("sun", (-3, -4, 5), power=3.0, size=2.0), "Key")
-    blender.add_light(opened.scene, stage.Light("sun", (5, -3, 2), power=1.0, size=20.0), "Fill")
-    blender.set_world(opened.scene, (0.35, 0.37, 0.4))
+    blender.add_light(opened.scene, stage.Light("sun", (-3, -4, 5), power=2.4, size=2.0), "Key")
+    blender.add_light(opened.scene, stage.Light("sun", (5, -3, 2), power=0.6, size=20.0), "Fill")
+    blender.set_world(opened.scene, (0.12, 0.13, 0.15))
     opened.notes.append("There is no light: two suns and a grey world were added")

@@ -79,7 +79,7 @@ def make_material(surface: Surface) -> bpy.types.Material:
     if surface.emission:
         shader.inputs["Emission Color"].default_value = (*surface.color, 1.0)
         shader.inputs["Emission Strength"].default_value = surface.emission
-    if surface.texture is not None:
+    if surface.texture is not None or surface.image is not None:
         texture = nodes.new("ShaderNodeTexImage")
         texture.image = _image(surface)
         texture.location = (-320, 280)
@@ -134,6 +134,8 @@ def box_uvs(source: Mesh, size: float) -> NDArray[np.float32]:
 
 
 def _image(surface: Surface) -> bpy.types.Image:
+    if surface.image is not None:
+        return bpy.data.images.load(str(surface.image), check_existing=True)
     assert surface.texture is not None
     height, width = surface.texture.shape[:2]
     image = bpy.data.images.new(surface.name, width, height)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from . import city, cornell, forest, models, room, soups, stadium, studio
+from . import city, cornell, forest, models, room, soups, sponza, stadium, studio
 from .errors import SceneCatalogueError, UnknownSceneError
 from .geometry import Mesh, box, placement
 from .stage import Stage, Surface
@@ -95,5 +95,8 @@ ENTRIES: tuple[Entry, ...] = (
     _generated("thin_triangles", "Long thin triangles that overlap: boxes fit them badly", soups.thin_stage),
     _generated("cornell_box", "Few large triangles and a mirror: the least a build can cost", cornell.stage),
     _generated("scan_room", "A closed room with a dense scan: every ray hits, most triangles in one place", room.stage),
+    Entry(
+        "sponza", "Architecture with textures: Crytek's Sponza, a wide range of sizes", lambda _seed, _: sponza.stage()
+    ),
     *(_model(model) for model in models.MODELS),
 )

@@ -68,7 +68,7 @@ MODELS: tuple[Model, ...] = (
         "ffa9367acc2c91b17998dec1b247fad33fa8c89dc7a1b66820adde015dbe36f8",
         None,
         "z",
-        200,
+        150,
         SIMPLIFIED,
     ),
     Model(
@@ -78,7 +78,7 @@ MODELS: tuple[Model, ...] = (
         "2d6ff752138d65de92d7481d46968ce3aebb97df67b97cd88c713fb3ec4a8cac",
         HORSE + "horse.ply",
         "z",
-        200,
+        150,
     ),
     Model(
         "goldfish1_sub",

@@ -30,25 +30,43 @@ class Element:
     properties: dict[str, str | tuple[str, str]]
 
 
-def read_ply(path: Path | str) -> Mesh:
-    """The vertices and triangles of a PLY file, everything else in it left out.
+@dataclass(frozen=True, eq=False)
+class PlyData:
+    """A file's numbers: columns of its n vertices and m triangles by name, and the triangles' corners (m, 3) int64."""
 
-    Vertices come first in the file, then faces, all of them triangles. Raises BrokenModelError where the file is no
-    such PLY, is cut short, or names a vertex it has not; OSError where it cannot be read.
+    vertex: dict[str, NDArray[Any]]
+    corners: NDArray[np.int64]
+    face: dict[str, NDArray[Any]]
+
+    @property
+    def mesh(self) -> Mesh:
+        """Vertices and triangles alone."""
+        return mesh(np.stack([self.vertex[axis] for axis in "xyz"], axis=1), self.corners)
+
+
+def read_ply(path: Path | str) -> Mesh:
+    """The vertices and triangles of a PLY file, everything else in it left out. Raises as `read_ply_data`."""
+    return read_ply_data(path).mesh
+
+
+def read_ply_data(path: Path | str) -> PlyData:
+    """All numbers of a PLY file whose vertices come first and then faces, all of them triangles.
+
+    Raises BrokenModelError where the file is no such PLY, is cut short, or names a vertex it has not; OSError where
+    it cannot be read.
     """
     path = Path(path)
     with path.open("rb") as stream:
         try:
             order, elements = _read_header(stream)
             vertex, face = _vertex_and_face(elements)
-            points, triangles = (
-                _read_text(stream, vertex, face) if order == "a" else _read_binary(stream, order, vertex, face)
-            )
+            found = _read_text(stream, vertex, face) if order == "a" else _read_binary(stream, order, vertex, face)
         except (ValueError, KeyError, IndexError) as error:
             raise BrokenModelError(path, str(error)) from error
-    if len(triangles) and not (triangles.min() >= 0 and triangles.max() < len(points)):
+    count = len(found.vertex["x"])
+    if len(found.corners) and not (found.corners.min() >= 0 and found.corners.max() < count):
         raise BrokenModelError(path, "a face names a vertex that is not in the file")
-    return mesh(points, triangles)
+    return found
 
 
 def write_ply(path: Path | str, source: Mesh, comments: tuple[str, ...] = ()) -> None:
@@ -101,24 +119,25 @@ def _vertex_and_face(elements: list[Element]) -> tuple[Element, Element]:
     return vertex, face
 
 
-def _read_binary(
-    stream: IO[bytes], order: str, vertex: Element, face: Element
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    records = _records(
-        stream, np.dtype([(name, order + str(kind)) for name, kind in vertex.properties.items()]), vertex
-    )
+def _read_binary(stream: IO[bytes], order: str, vertex: Element, face: Element) -> PlyData:
+    columns = np.dtype([(name, order + str(kind)) for name, kind in vertex.properties.items()])
+    records = _records(stream, columns, vertex)
     listed = next(iter(face.properties.values()))
     assert isinstance(listed, tuple)
-    count_type, index_type = listed
-    fields: list[Any] = [("count", order + count_type), ("corners", order + index_type, 3)]
-    for name, kind in list(face.properties.items())[1:]:
+    fields: list[Any] = [("count", order + listed[0]), ("corners", order + listed[1], 3)]
+    others = list(face.properties.items())[1:]
+    for name, kind in others:
         if isinstance(kind, tuple):
             raise ValueError(f"its faces have a second list, '{name}'")
-        fields.append((name, order + kind))
+        fields.append((f"face {name}", order + kind))
     faces = _records(stream, np.dtype(fields), face)
     if len(faces) and not (faces["count"] == 3).all():
         raise ValueError("it has faces that are not triangles")
-    return np.stack([records[axis] for axis in "xyz"], axis=1), faces["corners"].astype(np.int64)
+    return PlyData(
+        {name: records[name] for name in vertex.properties},
+        faces["corners"].astype(np.int64),
+        {name: faces[f"face {name}"] for name, _ in others},
+    )
 
 
 def _records(stream: IO[bytes], dtype: np.dtype[Any], element: Element) -> NDArray[Any]:
@@ -128,19 +147,24 @@ def _records(stream: IO[bytes], dtype: np.dtype[Any], element: Element) -> NDArr
     return np.frombuffer(data, dtype, element.count)
 
 
-def _read_text(stream: IO[bytes], vertex: Element, face: Element) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    columns = [list(vertex.properties).index(axis) for axis in "xyz"]
-    points = _rows(stream, vertex)[:, columns]
-    faces = _rows(stream, face)
-    if len(faces) and (faces.shape[1] < 4 or not (faces[:, 0] == 3).all()):
+def _read_text(stream: IO[bytes], vertex: Element, face: Element) -> PlyData:
+    points, faces = _rows(stream, vertex), _rows(stream, face)
+    if points.shape[1] < len(vertex.properties):
+        raise ValueError("its vertex lines are short")
+    if len(faces) and (faces.shape[1] < 3 + len(face.properties) or not (faces[:, 0] == 3).all()):
         raise ValueError("it has faces that are not triangles")
-    return points, faces[:, 1:4].astype(np.int64)
+    others = list(face.properties)[1:]
+    return PlyData(
+        {name: points[:, column] for column, name in enumerate(vertex.properties)},
+        faces[:, 1:4].astype(np.int64),
+        {name: faces[:, 4 + column] for column, name in enumerate(others)},
+    )
 
 
 def _rows(stream: IO[bytes], element: Element) -> NDArray[np.float64]:
     """(count, columns) float64 of the next `count` lines, which all have as many numbers."""
     if element.count == 0:
-        return np.zeros((0, 4))
+        return np.zeros((0, 3 + len(element.properties)))
     lines = [stream.readline() for _ in range(element.count)]
     if not lines[-1]:
         raise ValueError(f"it ends within its {element.count} {element.name} lines")

@@ -4,6 +4,7 @@ Lengths in metres, angles in degrees, colours scene-linear Rec.709, z up.
 """
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -18,7 +19,8 @@ Vector = tuple[float, float, float]
 class Surface:
     """A material. `texture` (h, w, 3) sRGB replaces `color` and repeats every `texture_size` metres.
 
-    A mirror has metallic 1 and roughness 0. `emission` is radiance.
+    `image`, a file, does so too, laid on by the part's own texture coordinates. A mirror has metallic 1 and
+    roughness 0. `emission` is radiance.
     """
 
     name: str
@@ -28,6 +30,7 @@ class Surface:
     emission: float = 0.0
     texture: NDArray[np.float32] | None = None
     texture_size: float = 1.0
+    image: Path | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,7 +19,7 @@ from espalier_scenes.errors import (
     UnknownSceneError,
 )
 from espalier_scenes.geometry import icosphere, mesh
-from espalier_scenes.ply import read_ply, write_ply
+from espalier_scenes.ply import read_ply, read_ply_data, write_ply
 
 SPHERE = icosphere(2)
 ASCII = b"""ply
@@ -116,6 +116,24 @@ def test_ascii_and_big_endian_ply_read_alike(tmp_path: Path) -> None:
         assert triangles.tolist() == [[0, 1, 2], [0, 2, 3]]
 
 
+def test_other_columns_are_read_too(tmp_path: Path) -> None:
+    text = ASCII.replace(b"vertex_index\n", b"vertex_index\nproperty uchar material\n")
+    text = text.replace(b"3 0 1 2", b"3 0 1 2 7").replace(b"3 0 2 3", b"3 0 2 3 8")
+    (tmp_path / "text.ply").write_bytes(text)
+    header = text[: text.index(b"end_header\n") + 11].replace(b"ascii", b"binary_little_endian")
+    rows = np.array([[0, 0, 0, 4], [1, 0, 0, 3], [1, 1, 0.25, 2], [0, 1, 0, 1]], "<f4").tobytes()
+    faces = b"".join(
+        b"\x03" + np.array(face, "<i4").tobytes() + bytes([material])
+        for face, material in (((0, 1, 2), 7), ((0, 2, 3), 8))
+    )
+    (tmp_path / "binary.ply").write_bytes(header + rows + faces)
+    for name, confidence in (("text.ply", [1, 1, 1, 1]), ("binary.ply", [4, 3, 2, 1])):
+        data = read_ply_data(tmp_path / name)
+        assert data.vertex["confidence"].tolist() == confidence
+        assert data.face["material"].tolist() == [7, 8]
+        assert data.corners.tolist() == [[0, 1, 2], [0, 2, 3]]
+
+
 @pytest.mark.parametrize(
     ("name", "content"),
     [
@@ -186,6 +204,11 @@ def test_without_the_file_or_the_network_the_error_says_what_to_do(cache: Path, 
 def test_a_model_of_no_archive_names_the_folder(cache: Path) -> None:
     with pytest.raises(ModelMissingError, match=r"ESPALIER_MODELS to a folder with ball\.ply"):
         models.locate(replace(model(None), url=None))
+
+
+def test_sponza_is_named_where_it_is_missing(cache: Path) -> None:
+    with pytest.raises(ModelMissingError, match="sponza_crytek"):
+        catalogue.find("sponza").stage()
 
 
 def test_the_catalogue_names_the_papers_models_and_knows_no_other() -> None:
