@@ -114,9 +114,10 @@ class Comparison:
             return ""
         if self._difference > 0.0:
             return "Difference"
-        if self._second is not None:
-            return f"{'Cycles' if self._with_cycles else 'Pictures'}: {self._second.status}"
-        return self.run.status
+        if self._second is None and self.run.status:
+            return self.run.status
+        second = "start" if self._second is None else self._second.status
+        return f"{'Cycles' if self._with_cycles else 'Pictures'}: {second}"
 
     def raise_error(self) -> None:
         """Raise what ended the thread early, if anything but a cancel did."""

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import bpy
@@ -136,10 +137,25 @@ def test_a_folder_that_cannot_be_written_is_one_line_and_status_2(tmp_path: Path
     assert done.stderr.count("\n") == 1
 
 
-def children(process: int) -> list[str]:
-    """Command lines of the living processes that have this parent."""
-    found = subprocess.run(["ps", "-o", "args=", "--ppid", str(process)], capture_output=True, text=True, check=False)
-    return found.stdout.splitlines()
+def workers(parent: int) -> list[int]:
+    """The second Blenders that have this parent."""
+    command = ["ps", "-o", "pid=,args=", "--ppid", str(parent)]
+    lines = subprocess.run(command, capture_output=True, text=True, check=False).stdout.splitlines()
+    return [int(line.split()[0]) for line in lines if "cycles_worker" in line]
+
+
+def is_alive(process: int) -> bool:
+    """True while the process runs; one that waits to be buried does not."""
+    command = ["ps", "-o", "stat=", "-p", str(process)]
+    state = subprocess.run(command, capture_output=True, text=True, check=False).stdout.strip()
+    return bool(state) and not state.startswith("Z")
+
+
+def wait_for(condition: Callable[[], object], seconds: float = 30.0) -> None:
+    deadline = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < deadline, "waited too long"
+        time.sleep(0.05)
 
 
 @pytest.mark.skipif(os.name != "posix", reason="Ctrl C is a POSIX signal here")
@@ -155,11 +171,22 @@ def test_ctrl_c_ends_with_130_and_leaves_nothing(tmp_path: Path, when: str) -> N
         if line.strip() == when:
             break
     if when == "Cycles":
-        deadline = time.monotonic() + 30
-        while not any("cycles_worker" in line for line in children(process.pid)) and time.monotonic() < deadline:
-            time.sleep(0.05)
+        wait_for(lambda: workers(process.pid))
     process.send_signal(signal.SIGINT)
     _, err = process.communicate(timeout=20)
     assert process.returncode == 130
     assert err == "espalier: interrupted\n"
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(os.name != "posix", reason="ps is POSIX")
+def test_the_second_blender_does_not_outlive_a_killed_first(tmp_path: Path) -> None:
+    arguments = ("compare", "cornell_box", "--methods", "bvh-sah", "--samples", 40, "--resolution", "300x300")
+    environment = os.environ | {"TMPDIR": str(tmp_path)}
+    with subprocess.Popen(
+        command(*arguments, "--out", tmp_path / "out"), stdout=subprocess.DEVNULL, env=environment
+    ) as process:
+        wait_for(lambda: workers(process.pid))
+        (worker,) = workers(process.pid)
+        process.kill()
+    wait_for(lambda: not is_alive(worker), seconds=10.0)
