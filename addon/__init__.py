@@ -12,6 +12,7 @@ MODULES: tuple[str, ...] = (
     "engine",
     "borrowed_panels",
     "overlay",
+    "shown_images",
     "operators",
     "ui",
     "command_line",

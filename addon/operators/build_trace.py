@@ -2,7 +2,7 @@
 
 import bpy
 
-from .. import areas, capture, methods, results, session
+from .. import capture, methods, results, session, shown_images
 from . import reasons
 from .task import Task, TaskOperator
 
@@ -37,7 +37,7 @@ and show times, image and cells"""
     def finish(self, _context: bpy.types.Context) -> str:
         finished = self._session.run.results
         shown = self._session.result(self._shown_method) or finished[-1]
-        areas.show_image(areas.store_image(IMAGE, shown.render.combined))
+        shown_images.show(shown_images.store(IMAGE, shown.render.combined))
         fastest = min(finished, key=time_to_image)
         return (
             f"Traced {self._session.run.data.triangle_count:,} triangles; "

@@ -2,7 +2,7 @@
 
 import bpy
 
-from .. import areas, compare, methods, results, session
+from .. import compare, methods, results, session, shown_images
 from . import reasons
 from .task import Task, TaskOperator
 
@@ -41,7 +41,7 @@ images above their difference. Scene and settings stay as they are"""
         cycles, difference = outcome.report.cycles, outcome.report.difference
         rows = [*results.rows(self._comparison.run), results.cycles_row(cycles)]
         results.store(self._scene_uid, rows, outcome.notes)
-        areas.show_image(areas.store_picture(IMAGE, outcome.picture))
+        shown_images.show(shown_images.store(IMAGE, outcome.picture))
         return f"Cycles took {cycles.total_s:.2f} s; the images differ by {difference.flip_mean:.3f} (FLIP, 0 to 1)"
 
 

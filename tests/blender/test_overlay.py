@@ -122,6 +122,31 @@ settings.show = True
     assert each - without < SECONDS_IN_SOFTWARE
 
 
+def test_an_undo_leaves_picture_table_and_boxes(desktop: Desktop) -> None:
+    names, shown, rows, boxes = ask(
+        desktop,
+        f"""
+results = importlib.import_module("{MODULE}.results")
+area = next(area for area in window.screen.areas if area.type == 'OUTLINER')
+area.type = 'IMAGE_EDITOR'
+area.spaces.active.image = bpy.data.images["Espalier"]
+with bpy.context.temp_override(window=window, area=view, region=region):
+    bpy.ops.ed.undo_push(message="Test")
+    bpy.ops.object.empty_add()
+    bpy.ops.ed.undo_push(message="Test")
+    bpy.ops.espalier.build_trace()
+    bpy.ops.ed.undo()
+names = [image.name for image in bpy.data.images if image.name.startswith("Espalier")]
+shown = area.spaces.active.image
+value = [names, shown and shown.name, len(results.of(window.scene.session_uid).rows), drawn().shown]
+""",
+    )
+    assert names == ["Espalier"]
+    assert shown == "Espalier"
+    assert rows == 5
+    assert boxes > 0
+
+
 def test_clear_results_takes_the_boxes_away(desktop: Desktop) -> None:
     assert ask(desktop, "bpy.ops.espalier.clear_results()\nvalue = drawn() is None")
 

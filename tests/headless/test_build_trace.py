@@ -9,7 +9,7 @@ import pytest
 import snapshot
 from building import camera, square
 
-from espalier import areas, overlay, results, session
+from espalier import areas, overlay, results, session, shown_images
 from espalier.methods import METHOD_NAMES
 from espalier.operators import task
 
@@ -151,4 +151,4 @@ def test_without_a_window_nothing_is_drawn_or_shown(ready):
     bpy.ops.espalier.build_trace()
     assert overlay.drawing(ready) is None
     areas.redraw(task.VIEWS)
-    areas.show_image(bpy.data.images["Espalier"])
+    shown_images.show(bpy.data.images["Espalier"])
