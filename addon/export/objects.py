@@ -34,7 +34,7 @@ class Objects:
         self._moved = moved
         self._override: Any = depsgraph.view_layer.material_override
         self._placements: dict[int, Placement | None] = {}
-        self._slots: dict[tuple[int, int], tuple[int, ...]] = {}
+        self._known: dict[tuple[int, int], tuple[Placement | None, tuple[int, ...]]] = {}
         for instance in depsgraph.object_instances:
             if instance.show_self:
                 self._visit(instance)
@@ -47,24 +47,34 @@ class Objects:
     def _visit(self, instance: bpy.types.DepsgraphObjectInstance) -> None:
         """Curves, text, surfaces and metaballs come twice, as themselves and as a mesh: only the mesh is taken."""
         thing: Any = instance.object
-        if thing.type == "MESH":
+        kind = thing.type
+        if kind == "MESH":
             self._mesh(thing, instance)
-        elif thing.type == "LIGHT":
+        elif kind == "LIGHT":
             self.lights.append(read_light(thing.data, self._matrix(instance), thing.name, self._notes))
-        elif thing.type in UNSUPPORTED:
-            self._notes.add(f"Object '{thing.name}' is {UNSUPPORTED[thing.type]} and is left out")
+        elif kind in UNSUPPORTED:
+            self._notes.add(f"Object '{thing.name}' is {UNSUPPORTED[kind]} and is left out")
 
     def _mesh(self, thing: Any, instance: Any) -> None:
+        """Add an instance of a mesh. An object is known by its original, as instances have passing objects."""
         mesh = thing.data
+        key = (mesh.as_pointer(), thing.original.as_pointer())
+        known = self._known.get(key)
+        if known is None:
+            slots = self._slots(thing)
+            known = self._known[key] = (self._placement(thing, mesh, slots), slots)
+        placement, slots = known
+        if placement is not None:
+            placement.add(self._matrix(instance), slots)
+
+    def _placement(self, thing: Any, mesh: Any, slots: tuple[int, ...]) -> Placement | None:
+        """The mesh, read the first time it comes up; None where it has no face."""
         key = mesh.as_pointer()
-        slots = self._slots_of(thing, key)
         if key not in self._placements:
             uv_maps = [self._materials.uv_maps.get(index, "") for index in slots]
             local = _read_edited(thing, uv_maps) if mesh.is_editmode else read_mesh(mesh, uv_maps)
             self._placements[key] = None if local is None else Placement(local)
-        placement = self._placements[key]
-        if placement is not None:
-            placement.add(self._matrix(instance), slots)
+        return self._placements[key]
 
     def _matrix(self, instance: Any) -> Matrix:
         """Local to world; the iterator reuses its own matrix, so this is a copy."""
@@ -72,14 +82,11 @@ class Objects:
             return instance.matrix_world.copy()
         return self._moved.get(instance.object.original.as_pointer(), instance.matrix_world).copy()
 
-    def _slots_of(self, thing: Any, mesh: int) -> tuple[int, ...]:
-        """Material of every slot; kept by original object and mesh, as instances have passing objects."""
-        key = (thing.original.as_pointer(), mesh)
-        if key not in self._slots:
-            self._note_ignored(thing)
-            materials = [self._override or slot.material for slot in thing.material_slots] or [self._override]
-            self._slots[key] = tuple(self._materials.index(material) for material in materials)
-        return self._slots[key]
+    def _slots(self, thing: Any) -> tuple[int, ...]:
+        """Material of every slot of an object, at least one."""
+        self._note_ignored(thing)
+        materials = [self._override or slot.material for slot in thing.material_slots] or [self._override]
+        return tuple(self._materials.index(material) for material in materials)
 
     def _note_ignored(self, thing: Any) -> None:
         """Note what an object asks for and a trace does not do."""
