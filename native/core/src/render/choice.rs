@@ -27,13 +27,13 @@ impl<'a> Choice<'a> {
     }
 
     /// The `number`th light of a point, and the weight of what it gives. Choices are stratified: one random number in 0
-    /// to 1 serves all numbers of a point.
+    /// to 1 serves all numbers of a point; it is asked for where there is a choice.
     #[inline]
-    pub fn pick(&self, number: usize, random: f32) -> (&'a Emitter, f32) {
+    pub fn pick(&self, number: usize, random: impl FnOnce() -> f32) -> (&'a Emitter, f32) {
         if self.cumulative.is_empty() {
             return (&self.emitters[number], 1.0);
         }
-        let place = (number as f32 + random) / MOST_LIGHTS as f32;
+        let place = (number as f32 + random()) / MOST_LIGHTS as f32;
         let index = self.cumulative.partition_point(|&sum| sum <= place).min(self.emitters.len() - 1);
         let below = if index == 0 { 0.0 } else { self.cumulative[index - 1] };
         let share = self.cumulative[index] - below;

@@ -33,7 +33,7 @@ fn tile_steps(context: &Context<'_>, tile: Window) -> Result<Vec<u64>, Error> {
     for sample in 0..context.settings.samples {
         context.job.check()?;
         rays.clear();
-        primary_rays(context.camera, context.settings, tile, sample).for_each(|ray| rays.push(&ray, ()));
+        primary_rays(context, tile, sample).for_each(|ray| rays.push(&ray, ()));
         context.tracer.counted(&rays.rays()?, &mut counts)?;
         sums.iter_mut().zip(&counts).for_each(|(sum, count)| *sum += u64::from(count.steps));
         context.job.advance(tile.count() as u64);

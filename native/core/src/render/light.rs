@@ -145,13 +145,23 @@ impl Emitter {
         self.strength.abs().max_element() * whole
     }
 
-    /// Light that arrives at `point` on a surface with normal `normal`; `random` are two numbers in 0 to 1.
+    /// Light that arrives at `point` on a surface with normal `normal`; `random` gives two numbers in 0 to 1, and is
+    /// not asked where light comes from one direction only.
     #[inline]
-    pub fn sample(&self, point: Vec3, normal: Vec3, random: [f32; 2]) -> Option<Incident> {
+    pub fn sample(&self, point: Vec3, normal: Vec3, random: impl FnOnce() -> [f32; 2]) -> Option<Incident> {
+        let random = if self.is_hard() { [0.0; 2] } else { random() };
         match &self.shape {
             Shape::Bulb { bulb, cone } => self.sample_bulb(*bulb, cone.as_ref(), point, normal, random),
             Shape::Sun { one_minus_cosine, projected } => Some(self.sample_sun(*one_minus_cosine, *projected, random)),
             Shape::Area { half, round, spread } => self.sample_area(half, *round, spread.as_ref(), point, random),
+        }
+    }
+
+    fn is_hard(&self) -> bool {
+        match self.shape {
+            Shape::Bulb { bulb, .. } => bulb.radius == 0.0,
+            Shape::Sun { projected, .. } => projected == 0.0,
+            Shape::Area { .. } => false,
         }
     }
 

@@ -94,7 +94,8 @@ pub fn render(
     check(accelerator, scene, settings)?;
     let passes = 1 + u64::from(settings.cost);
     job.begin(Phase::Trace, camera.window().count() as u64 * u64::from(settings.samples) * passes);
-    let context = Context { tracer: accelerator.tracer(), scene, camera, settings, choice: Choice::new(scene), job };
+    let (tracer, choice, key) = (accelerator.tracer(), Choice::new(scene), sampler::key(settings.seed));
+    let context = Context { tracer, scene, camera, settings, choice, key, job };
     let start = Instant::now();
     let (film, counters) = picture(&context)?;
     let total_s = start.elapsed().as_secs_f64();

@@ -44,6 +44,8 @@ pub struct Context<'a> {
     pub settings: &'a Settings,
     /// The lights.
     pub choice: Choice<'a>,
+    /// Of the samplers.
+    pub key: u32,
     /// Whether to go on.
     pub job: &'a Job,
 }
@@ -99,15 +101,12 @@ pub struct Wavefront {
 
 /// The primary rays of a tile, in the order of its pixels. The only sample of a pixel is at its centre; more are spread
 /// over it.
-pub fn primary_rays(camera: &Camera, settings: &Settings, window: Window, sample: u32) -> impl Iterator<Item = Ray> {
-    let place = move |pixel: [u32; 2]| match settings.samples {
-        1 => [0.5; 2],
-        _ => Sampler::new(settings.seed, pixel, sample).pair(0, Purpose::Pixel, 0),
-    };
+pub fn primary_rays(context: &Context<'_>, window: Window, sample: u32) -> impl Iterator<Item = Ray> {
+    let (camera, key, centred) = (context.camera, context.key, context.settings.samples == 1);
     (0..window.count()).map(move |index| {
         let pixel = window.pixel(index);
-        let [x, y] = place(pixel);
-        camera.ray(f64::from(pixel[0]) + f64::from(x), f64::from(pixel[1]) + f64::from(y))
+        let place = if centred { [0.5; 2] } else { Sampler::new(key, pixel, sample).pair(0, Purpose::Pixel, 0) };
+        camera.ray(f64::from(pixel[0]) + f64::from(place[0]), f64::from(pixel[1]) + f64::from(place[1]))
     })
 }
 
@@ -118,7 +117,7 @@ impl Wavefront {
     /// [`Error::Cancelled`].
     pub fn sample(&mut self, context: &Context<'_>, tile: &mut Tile, sample: u32) -> Result<(), Error> {
         self.paths.clear();
-        for (index, ray) in primary_rays(context.camera, context.settings, tile.window, sample).enumerate() {
+        for (index, ray) in primary_rays(context, tile.window, sample).enumerate() {
             self.paths.push(&ray, Path { pixel: index as u32, throughput: Vec3::ONE });
         }
         self.counters.primary_rays += self.paths.len() as u64;
@@ -222,9 +221,8 @@ impl Wavefront {
         self.shadows.clear();
         for Lit { surface, path } in &self.lit {
             let sampler = context.sampler(tile, path.pixel, sample);
-            let [place, _] = sampler.pair(bounce, Purpose::Choice, 0);
-            let (emitter, weight) = context.choice.pick(number, place);
-            let random = sampler.pair(bounce, Purpose::Light, number as u32);
+            let (emitter, weight) = context.choice.pick(number, || sampler.pair(bounce, Purpose::Choice, 0)[0]);
+            let random = || sampler.pair(bounce, Purpose::Light, number as u32);
             let incident = emitter.sample(surface.origin, surface.shading, random);
             let Some((incident, light)) = incident.and_then(|incident| reflected(surface, incident)) else { continue };
             let path = path.through(light * weight);
@@ -258,7 +256,7 @@ const NEARLY: f32 = 1.0 - 1e-5;
 impl Context<'_> {
     #[inline]
     fn sampler(&self, tile: &Tile, pixel: u32, sample: u32) -> Sampler {
-        Sampler::new(self.settings.seed, tile.window.pixel(pixel as usize), sample)
+        Sampler::new(self.key, tile.window.pixel(pixel as usize), sample)
     }
 }
 

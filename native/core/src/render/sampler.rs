@@ -31,21 +31,25 @@ pub struct Sampler {
     sample: u32,
 }
 
+/// What all samplers of a picture share.
+pub fn key(seed: u64) -> u32 {
+    mixed(seed as u32 ^ mixed((seed >> 32) as u32))
+}
+
 impl Sampler {
-    /// Numbers for sample `sample` of the pixel at `pixel` of the whole frame.
+    /// Numbers for sample `sample` of the pixel at `pixel` of the whole frame; `key` is that of the picture.
     #[inline]
-    pub fn new(seed: u64, pixel: [u32; 2], sample: u32) -> Self {
-        let key = mixed(seed as u32 ^ mixed((seed >> 32) as u32 ^ mixed(pixel[0] ^ mixed(pixel[1]))));
-        Self { key, sample }
+    pub fn new(key: u32, pixel: [u32; 2], sample: u32) -> Self {
+        Self { key: mixed(key ^ (pixel[1] << 16 | pixel[0])), sample }
     }
 
     /// Two numbers in 0 to 1 (excluded), for the `number`th of a purpose at a bounce.
     #[inline]
     pub fn pair(&self, bounce: u32, purpose: Purpose, number: u32) -> [f32; 2] {
-        let key = mixed(self.key ^ mixed(bounce << 16 ^ (purpose as u32 + number)));
+        let key = mixed(self.key ^ (bounce << 16 | (purpose as u32 + number)));
         let index = scrambled(self.sample.reverse_bits(), key).reverse_bits();
-        let x = scrambled(index, mixed(key ^ 0x9e37_79b9));
-        let y = scrambled(pascal(index), mixed(key ^ 0x85eb_ca6b));
+        let x = scrambled(index, key.wrapping_mul(0x9e37_79b1));
+        let y = scrambled(pascal(index), key.wrapping_mul(0x85eb_ca77));
         [x, y].map(unit)
     }
 }
@@ -150,12 +154,32 @@ mod tests {
             for (columns, rows) in [(1, 64), (2, 32), (4, 16), (8, 8), (16, 4), (32, 2), (64, 1)] {
                 let mut count = vec![0; 64];
                 for sample in 0..64 {
-                    let [x, y] = Sampler::new(7, [pixel, 3], sample).pair(1, Purpose::Light, 2);
+                    let [x, y] = Sampler::new(key(7), [pixel, 3], sample).pair(1, Purpose::Light, 2);
                     count[(y * rows as f32) as usize * columns + (x * columns as f32) as usize] += 1;
                 }
                 assert!(count.iter().all(|&count| count == 1), "{columns} by {rows}: {count:?}");
             }
         }
+    }
+
+    /// Over many pixels the numbers are uniform, and those of one purpose tell nothing of those of another.
+    #[test]
+    fn pixels_and_purposes_are_independent() {
+        let count = 20_000;
+        let (mut mean, mut products) = ([0.0f64; 4], [0.0f64; 4]);
+        for pixel in 0..count {
+            let sampler = Sampler::new(key(1), [pixel % 200, pixel / 200], 0);
+            let [a, b] = sampler.pair(0, Purpose::Pixel, 0).map(|value| f64::from(value) - 0.5);
+            let [c, d] = sampler.pair(0, Purpose::Light, 1).map(|value| f64::from(value) - 0.5);
+            for (sum, value) in mean.iter_mut().zip([a, b, c, d]) {
+                *sum += value / f64::from(count);
+            }
+            for (sum, value) in products.iter_mut().zip([a * b, a * c, c * d, b * d]) {
+                *sum += value / f64::from(count);
+            }
+        }
+        assert!(mean.iter().all(|mean| mean.abs() < 0.01), "{mean:?}");
+        assert!(products.iter().all(|product| product.abs() < 0.003), "{products:?}");
     }
 
     #[test]
