@@ -51,7 +51,6 @@ class TaskOperator:
     of Blender kept from before: undo replaces them while the task runs.
     """
 
-    options: bpy.types.OperatorProperties
     report: Callable[[set[str], str], None]
     begin: Callable[[bpy.types.Context], Task]
     advance: Callable[[bpy.types.Context], None]
@@ -66,7 +65,11 @@ class TaskOperator:
     def execute(self, context: bpy.types.Context) -> set[str]:
         if not self._start(context):
             return {"CANCELLED"}
-        self._task.wait()
+        try:
+            self._task.wait()
+        except KeyboardInterrupt:
+            self.cancel(context)
+            raise
         return self._end(context)
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
@@ -155,5 +158,6 @@ class TaskOperator:
         _current = None
         if self._timer is not None:
             context.window_manager.event_timer_remove(self._timer)
-            context.workspace.status_text_set(None)
+            for workspace in bpy.data.workspaces:  # the user may have gone to another since
+                workspace.status_text_set(None)
             self._timer = None
