@@ -13,11 +13,11 @@ PORTABLE   := $(if $(filter Linux,$(shell uname)),--zig --compatibility manylinu
 VERSION    := $(shell sed -n 's/^version = "\(.*\)"/\1/p' blender_manifest.toml)
 ZIP        := dist/espalier-$(VERSION).zip
 
-.PHONY: help demo test check format bench package clean
+.PHONY: help demo test check format bench bench-instructions bench-interfaces package clean
 .DELETE_ON_ERROR:
 
 help: ## List these commands
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-8s %s\n", $$1, $$2 }' Makefile
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-18s %s\n", $$1, $$2 }' Makefile
 
 demo: .venv/ready ## Trace a scene with every method and with Cycles: make demo [INPUT=file-or-scene-name]
 	$(BIN)/espalier compare "$(INPUT)" --resolution $(RESOLUTION) --cycles --out $(OUT)
@@ -39,8 +39,14 @@ format: .venv/tools ## Put Rust and Python into the form that `make check` wants
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
-bench: .venv/ready ## Measure every benchmark in tests/bench and record the results
+bench: .venv/ready ## Measure against Embree: make bench [SCENES=...] [CLASSES=...] [MODELS=folder] [THREADS=1] [ISA=avx2|avx512] [RECORD=1]
 	$(BIN)/python tests/bench/run.py
+
+bench-instructions: .venv/ready ## Count the instructions of fixed small cases with valgrind, against the record [RECORD=1]
+	$(BIN)/python tests/bench/instructions.py
+
+bench-interfaces: .venv/ready ## Measure what Python and Blender users call: embreex, BVHTree, scene.ray_cast [SCENES=...]
+	$(BIN)/python tests/bench/interfaces.py
 
 package: $(ZIP) ## Make the extension's zip in dist/, as Blender installs it
 

@@ -1,7 +1,8 @@
-"""The benchmarks' definitions, and the plans that the native harness reads."""
+"""The benchmarks' definitions and expected answers, and the plans that the native harness reads."""
 
 from __future__ import annotations
 
+import json
 import tomllib
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -16,6 +17,7 @@ from espalier_scenes.models import folder
 from espalier_scenes.ply import read_ply
 
 FILE = Path(__file__).with_name("definitions.toml")
+HITS = Path(__file__).with_name("hits.json")
 
 Mesh = tuple[NDArray[np.float32], NDArray[np.uint32]]
 
@@ -59,6 +61,7 @@ class Definitions:
     camera: dict[str, Any]
     classes: dict[str, dict[str, Any]]
     scenes: dict[str, Scene]
+    instructions: dict[str, Any]
 
     def choose_classes(self, names: Iterable[str]) -> list[dict[str, Any]]:
         """The plan's classes: those named, or all. Raises DefinitionError."""
@@ -92,14 +95,15 @@ class Definitions:
         return common | {"scene": scene.write(directory) | {"seed": self.seed}, "classes": classes}
 
 
-def load(file: Path = FILE) -> Definitions:
-    """Read the definitions."""
-    table = tomllib.loads(file.read_text(encoding="utf-8"))
+def load() -> Definitions:
+    """Read the definitions and the answers."""
+    table = tomllib.loads(FILE.read_text(encoding="utf-8"))
+    answers = json.loads(HITS.read_text(encoding="utf-8")) if HITS.exists() else {}
     models = folder()
     for name, entry in table["scenes"].items():
         camera = table["camera"] | entry.pop("camera", {})
         path = None if "catalogue" in entry else (models / f"{name}.ply").resolve()
-        table["scenes"][name] = Scene(name, camera, path=path, **entry)
+        table["scenes"][name] = Scene(name, camera, path=path, hits=answers.get(name, {}), **entry)
     return Definitions(**table)
 
 

@@ -17,9 +17,9 @@ class NativeError(Exception):
     """The harness could not be built or failed; the message says why."""
 
 
-def build() -> Path:
-    """Compile the harness and return its binary. Raises NativeError."""
-    command = ["cargo", "build", "--quiet", "--release", "-p", "espalier-bench"]
+def build(profile: str = "release") -> Path:
+    """Compile the harness with one of cargo's profiles and return its binary. Raises NativeError."""
+    command = ["cargo", "build", "--quiet", "--profile", profile, "-p", "espalier-bench"]
     command.append("--message-format=json-render-diagnostics")
     done = subprocess.run(command, cwd=WORKSPACE, stdout=subprocess.PIPE, text=True, check=False)
     messages = (json.loads(line) for line in done.stdout.splitlines())
@@ -53,8 +53,11 @@ def pin(threads: int) -> None:
         os.sched_setaffinity(0, cores[-threads:])
 
 
-def run(binary: Path, command: str, plan: dict[str, Any], file: Path) -> Iterator[dict[str, Any]]:
-    """Write the plan to `file`, run the harness over it, and yield its rows as it prints them. Raises NativeError."""
+def run(binary: Path, command: str, plan: dict[str, Any], file: Path, *more: str | Path) -> Iterator[dict[str, Any]]:
+    """Write the plan to `file`, run the harness over it with `more` arguments, and yield its rows as it prints them.
+
+    Raises NativeError with the harness's message.
+    """
     file.write_text(json.dumps(plan, indent=1), encoding="utf-8")
     with subprocess.Popen(
         [binary, command, file], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True

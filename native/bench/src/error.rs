@@ -15,6 +15,14 @@ pub enum Error {
         /// Why not.
         source: std::io::Error,
     },
+    /// A file cannot be written.
+    #[error("cannot write {}: {source}", path.display())]
+    Write {
+        /// Which file.
+        path: PathBuf,
+        /// Why not.
+        source: std::io::Error,
+    },
     /// The plan, or a file it names, makes no sense.
     #[error("bad plan: {0}")]
     Plan(String),

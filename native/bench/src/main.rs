@@ -2,7 +2,7 @@
 //! writes the plans, starts this, and shows what it prints, one JSON object a line.
 //!
 //! `espalier-bench race PLAN.json` measures; `espalier-bench hits PLAN.json` only counts the hits of the plan's
-//! rays, without Embree; `espalier-bench work PLAN.json CLASS METHOD REPEATS` does what a class times, without
+//! rays, without Embree; `espalier-bench rays PLAN.json CLASS FILE` writes them; `espalier-bench work PLAN.json CLASS METHOD REPEATS` does what a class times, without
 //! Embree: the difference between two numbers of repeats is what instruments can count.
 
 mod arena;
@@ -21,7 +21,7 @@ use std::{path::Path, process::ExitCode};
 
 use error::Error;
 use espalier_core::Method;
-use plan::{Kind, Plan, Query};
+use plan::{Class, Kind, Plan, Query};
 use serde_json::json;
 
 fn main() -> ExitCode {
@@ -30,10 +30,13 @@ fn main() -> ExitCode {
     let result = match arguments[..] {
         ["race", plan] => Plan::read(Path::new(plan)).and_then(|plan| race(&plan)),
         ["hits", plan] => Plan::read(Path::new(plan)).and_then(|plan| hits(&plan)),
+        ["rays", plan, class, file] => Plan::read(Path::new(plan)).and_then(|plan| rays(&plan, class, Path::new(file))),
         ["work", plan, class, method, repeats] => {
             Plan::read(Path::new(plan)).and_then(|plan| work(&plan, class, method, repeats))
         }
-        _ => Err(Error::Plan("the arguments are: race PLAN, hits PLAN, or work PLAN CLASS METHOD REPEATS".into())),
+        _ => Err(Error::Plan(
+            "the arguments are: race PLAN, hits PLAN, rays PLAN CLASS FILE, or work PLAN CLASS METHOD REPEATS".into(),
+        )),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
@@ -79,11 +82,37 @@ fn hits(plan: &Plan) -> Result<(), Error> {
     Ok(())
 }
 
+/// Write the rays of a class, column by column, and say how fast each of its methods traces them from Rust.
+fn rays(plan: &Plan, name: &str, file: &Path) -> Result<(), Error> {
+    let class = class(plan, name)?;
+    let scene = scene::Scene::read(plan)?;
+    let built = scene::Built::new(&scene);
+    let rays = scene.rays(class.rays, &built)?;
+    let bytes: Vec<u8> = rays.columns.iter().flatten().flat_map(|number| number.to_le_bytes()).collect();
+    std::fs::write(file, bytes).map_err(|source| Error::Write { path: file.into(), source })?;
+    let mut answer = rivals::Answer::new(rays.len());
+    for name in &class.methods {
+        let accelerator = built.get(Method::from_name(name)?)?;
+        let mut best = std::time::Duration::MAX;
+        for _ in 0..plan.rounds {
+            let trace = || arena::trace_ours(&accelerator, &rays, class, plan.threads, &mut answer);
+            let (time, result) = race::timed(plan.threads, trace);
+            best = result.map(|()| best.min(time))?;
+        }
+        println!("{}", json!({"method": name, "rays_per_second": rays.len() as f64 / best.as_secs_f64()}));
+    }
+    Ok(())
+}
+
+fn class<'p>(plan: &'p Plan, name: &str) -> Result<&'p Class, Error> {
+    let missing = || Error::Plan(format!("the plan has no class {name}"));
+    plan.classes.iter().find(|known| known.name == name).ok_or_else(missing)
+}
+
 /// Do what a class times, `repeats` times.
 fn work(plan: &Plan, class: &str, method: &str, repeats: &str) -> Result<(), Error> {
     let repeats: usize = repeats.parse().map_err(|_| Error::Plan(format!("'{repeats}' is no number of repeats")))?;
-    let missing = || Error::Plan(format!("the plan has no class {class}"));
-    let class = plan.classes.iter().find(|known| known.name == class).ok_or_else(missing)?;
+    let class = self::class(plan, class)?;
     let (scene, method) = (scene::Scene::read(plan)?, Method::from_name(method)?);
     let built = scene::Built::new(&scene);
     let rays = scene.rays(class.rays, &built)?;
