@@ -1,10 +1,10 @@
-"""A photographer's corner for one object: a curved backdrop, a key, a fill and a rim light. No bpy."""
+"""A photographer's corner for one object: a plate, a key, a fill and a rim light. No bpy."""
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .framing import frame
-from .geometry import Mesh, icosphere, mesh, placement, sheet, transformed
+from .geometry import Mesh, box, icosphere, mesh, placement, transformed
 from .stage import Light, Part, Stage, Surface, View
 from .textures import checker
 
@@ -12,17 +12,19 @@ DIRECTION = (0.42, -1.0, 0.42)
 """From the object towards the camera."""
 
 BALL = (1.3, -0.35, 0.33)
-"""Middle of the mirror ball, which stands on the floor, metres."""
+"""Middle of the mirror ball, which stands on the plate, metres."""
 
 
-def backdrop(half: float = 14.0, radius: float = 3.0, wall: float = 9.0) -> Mesh:
-    """A floor at z = 0 that bends upwards at the back (+y) without an edge."""
-    bend = np.linspace(0, np.pi / 2, 17)
-    y = np.concatenate([np.linspace(-half, 5.0, 12)[:-1], 5.0 + radius * np.sin(bend), [5.0 + radius]])
-    z = np.concatenate([np.zeros(11), radius * (1 - np.cos(bend)), [wall]])
-    x = np.linspace(-half, half, 3)
-    net = np.stack(np.broadcast_arrays(x[None, :], y[:, None], z[:, None]), axis=-1)
-    return sheet(net)
+def plate(subject: ArrayLike) -> Mesh:
+    """A slab under the points (n, 3), hardly larger than they are.
+
+    Not a floor to the horizon: with one, every model would be a teapot in a stadium, and a grid's cells as large as
+    its details.
+    """
+    points = np.asarray(subject, float)
+    low, high = points.min(axis=0), points.max(axis=0)
+    rim = 0.08 * (high - low).max()
+    return box((low[0] - rim, low[1] - rim, low[2] - 0.08), (high[0] + rim, high[1] + rim, low[2]))
 
 
 def standing(source: Mesh, up: str = "z", turn: float = 0.0, height: float = 2.0) -> Mesh:
@@ -40,20 +42,22 @@ def standing(source: Mesh, up: str = "z", turn: float = 0.0, height: float = 2.0
 
 
 def stage(parts: list[Part], subject: ArrayLike, mirror_ball: bool = True) -> Stage:
-    """The parts in the studio, the camera framed on the points `subject` (n, 3)."""
-    floor = checker(dark=(0.46, 0.47, 0.5), light=(0.62, 0.62, 0.62))
-    parts = [Part("Backdrop", backdrop(), Surface("Backdrop", texture=floor, texture_size=2.0)), *parts]
+    """The parts on a plate, the camera framed on the points `subject` (n, 3), which have their foot on z = 0."""
+    points = np.asarray(subject, float)
     if mirror_ball:
         ball = transformed(icosphere(5), placement(BALL, 0.0, BALL[2]))
-        subject = np.concatenate([np.asarray(subject), ball[0]])
-        parts.append(Part("Mirror Ball", ball, Surface("Mirror", (0.94, 0.94, 0.95), 1.0, 0.0), smooth=True))
-    view = frame(subject, DIRECTION, 60.0, margin=1.12)
+        points = np.concatenate([points, ball[0]])
+        parts = [*parts, Part("Mirror Ball", ball, Surface("Mirror", (0.94, 0.94, 0.95), 1.0, 0.0), smooth=True)]
+    slab = plate(points)
+    tiles = Surface("Tiles", texture=checker(dark=(0.46, 0.47, 0.5), light=(0.66, 0.66, 0.66)), texture_size=0.6)
+    view = frame(np.concatenate([points, slab[0]]), DIRECTION, 60.0, margin=1.06)
     lights = [
         Light("area", (-3.6, -4.0, 5.2), (0, 0, 0.8), power=850, size=2.6, color=(1.0, 0.96, 0.9)),
         Light("area", (5.0, -2.6, 2.6), (0, 0, 0.8), power=240, size=3.0, color=(0.82, 0.9, 1.0)),
         Light("area", (1.5, 4.0, 5.0), (0, 0, 0.8), power=320, size=2.0),
     ]
-    return Stage(parts, lights, View(tuple(view.position), tuple(view.target), 60.0), world=(0.2, 0.22, 0.25))
+    camera = View(tuple(view.position), tuple(view.target), 60.0)
+    return Stage([Part("Plate", slab, tiles), *parts], lights, camera, world=(0.1, 0.11, 0.13))
 
 
 def model_stage(source: Mesh, up: str = "z", turn: float = 0.0) -> Stage:
