@@ -1,5 +1,6 @@
 //! Lights against Cycles: radiance of a white floor, 1 m beside the foot of a light, as Cycles 4.5.15 rendered it with 64
-//! samples (mean of 16 by 16 pixels over 0.2 m). `tests/headless/test_against_cycles.py` asks the Cycles at hand.
+//! samples (mean of 16 by 16 pixels over 0.2 m). The Cycles at hand is asked by
+//! `tests/headless/test_lights_and_cameras_against_cycles.py`.
 
 mod common;
 
