@@ -59,9 +59,8 @@ def run(binary: Path, command: str, plan: dict[str, Any], file: Path, *more: str
     Raises NativeError with the harness's message.
     """
     file.write_text(json.dumps(plan, indent=1), encoding="utf-8")
-    with subprocess.Popen(
-        [binary, command, file], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as process:
+    arguments = [binary, command, file, *more]
+    with subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         try:
             yield from (json.loads(line) for line in process.stdout)
         finally:
