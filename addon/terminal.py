@@ -4,6 +4,7 @@ One way of drawing serves the shell and Blender's own Python, which has no packa
 """
 
 import contextlib
+import ctypes
 import os
 import tempfile
 import time
@@ -66,8 +67,15 @@ def own_streams() -> Iterator[tuple[TextIO, TextIO]]:
         try:
             yield streams[0], streams[1]
         finally:
+            _flush_c()
             for descriptor, original in zip((1, 2), kept, strict=True):
                 os.dup2(original, descriptor)
                 os.close(original)
             for stream in streams:
                 stream.close()
+
+
+def _flush_c() -> None:
+    """Write out what C holds back of its standard streams, as it does where they are no terminal."""
+    c = ctypes.CDLL("ucrtbase" if os.name == "nt" else None)
+    c.fflush(None)
