@@ -123,10 +123,8 @@ pub fn guard<T>(py: Python<'_>, work: impl FnOnce() -> PyResult<T>) -> PyResult<
     let result = catch_unwind(AssertUnwindSafe(work));
     let result = result.unwrap_or_else(|panic| Err(Kind::Internal.error(py, describe(&*panic))));
     result.map_err(|error| {
-        if error.get_type(py).is(py.get_type::<PyMemoryError>()) {
-            return Kind::OutOfMemory.error(py, format!("out of memory: {}", error.value(py)));
-        }
-        error
+        let is_foreign = error.is_instance_of::<PyMemoryError>(py) && !error.is_instance_of::<EspalierError>(py);
+        if is_foreign { Kind::OutOfMemory.error(py, format!("out of memory: {}", error.value(py))) } else { error }
     })
 }
 

@@ -1,6 +1,7 @@
 //! A batch of rays from numpy arrays.
 
 use espalier_core::{Column, Error, Rays};
+use numpy::{PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 
 use crate::{
@@ -79,7 +80,8 @@ enum Limit<'py> {
 impl<'py> Limit<'py> {
     fn new(given: &Given<'py>, default: f32, count: usize, argument: Argument<'_>) -> PyResult<Self> {
         let Some(value) = &given.0 else { return Ok(Self::One(default)) };
-        if let Ok(number) = value.extract::<f64>() {
+        let is_list = value.cast::<PyUntypedArray>().is_ok_and(|array| array.ndim() > 0);
+        if !is_list && let Ok(number) = value.extract::<f64>() {
             return Ok(Self::One(number as f32));
         }
         let array = argument.array(value, &format!("a number or a float32 array of shape ({count},)"))?;

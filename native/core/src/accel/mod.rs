@@ -67,6 +67,14 @@ impl Method {
         }
     }
 
+    /// How often a build goes through all triangles: to divide them, to judge them, to pack them.
+    fn passes(self) -> u64 {
+        match self {
+            Self::BvhMedian | Self::BvhSah | Self::Grid => 2,
+            Self::HybridSampled | Self::HybridCost => 3,
+        }
+    }
+
     /// The method of that name.
     ///
     /// # Errors
@@ -106,7 +114,7 @@ impl Accelerator {
     /// [`Error::Config`], [`Error::Cancelled`], [`Error::OutOfMemory`].
     pub fn build(mesh: Arc<Mesh>, method: Method, config: &Config, threads: usize, job: &Job) -> Result<Self, Error> {
         config.check()?;
-        job.begin(Phase::Build, 2 * mesh.solid().len() as u64);
+        job.begin(Phase::Build, method.passes() * mesh.solid().len() as u64);
         let mut builder = Builder { mesh: &mesh, config, job, phases: Vec::new(), decisions: Vec::new() };
         let structure = pool::install(threads, || builder.structure(method))??;
         let Builder { phases, decisions, .. } = builder;
@@ -224,6 +232,7 @@ impl Builder<'_> {
             return Ok(Tree::default());
         }
         let grid = self.timed("grid", |this| this.grid(&items))?;
+        self.job.advance(items.len() as u64);
         let root = TreeNode { bounds: self.mesh.bounds(), first: 0, count: items.len() as u32, kind: Kind::Grid(0) };
         Ok(Tree { nodes: vec![root], items, grids: vec![grid] })
     }

@@ -62,6 +62,7 @@ impl Packer<'_> {
             Kind::Leaf => self.leaf(index),
             Kind::Grid(grid) => NodeRef::grid(grid as usize),
         };
+        self.job.advance(u64::from(self.tree.nodes[index].count));
         Ok(Packed { root, stack_size: 0 })
     }
 
