@@ -4,6 +4,7 @@
 //! Data flows one way: [`mesh`] → [`accel`] (policy → tree → pack) → [`traverse`] → [`render`].
 
 pub mod accel;
+pub mod arena;
 pub mod bounds;
 pub mod error;
 pub mod job;

@@ -54,7 +54,7 @@ impl<'a> Column<'a> {
     }
 
     /// The value of ray `index`.
-    #[inline]
+    #[inline(always)]
     pub fn get(&self, index: usize) -> f32 {
         self.values[index * self.stride]
     }
@@ -149,7 +149,7 @@ impl<'a> Rays<'a> {
     }
 
     /// Gather ray `index`.
-    #[inline]
+    #[inline(always)]
     pub fn get(&self, index: usize) -> Ray {
         let index = self.first + index;
         let gather = |columns: &[Column; 3]| Vec3::from_array(columns.map(|column| column.get(index)));

@@ -9,6 +9,7 @@
 //! Mücke, "Simulation of Simplicity", ACM TOG 9(1), 1990. So every point of a closed mesh's silhouette-free projection
 //! has one owner: no ray slips through an edge or a vertex, and none is counted twice.
 
+use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
 use crate::{
@@ -20,7 +21,7 @@ use crate::{
 pub const LANES: usize = 8;
 
 /// Eight triangles, corner by corner and axis by axis: `corner[c][k][lane]`.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub struct Block {
     /// Coordinates; unused lanes hold zeros.

@@ -87,11 +87,11 @@ fn other_methods_decide_nothing_and_small_meshes_tell_why() {
 fn fingerprint(accelerator: &Accelerator) -> u64 {
     let structure = accelerator.structure();
     let mut hasher = DefaultHasher::new();
-    for node in &structure.nodes {
+    for node in structure.nodes.iter() {
         node.plane.as_flattened().iter().for_each(|plane| plane.to_bits().hash(&mut hasher));
         format!("{:?}", node.child).hash(&mut hasher);
     }
-    for block in &structure.blocks {
+    for block in structure.blocks.iter() {
         block.primitive.hash(&mut hasher);
     }
     (&structure.starts, &structure.references, structure.stack_size).hash(&mut hasher);

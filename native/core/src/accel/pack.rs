@@ -8,7 +8,9 @@ use super::{
     structure::{Node, NodeRef, Structure},
     tree::{Kind, Tree},
 };
-use crate::{Error, Job, Mesh, bounds::Bounds, error, traverse::frame::Domain, triangle::Block, triangle::LANES};
+use crate::{
+    Error, Job, Mesh, arena::Arena, bounds::Bounds, error, traverse::frame::Domain, triangle::Block, triangle::LANES,
+};
 
 /// Pack a tree.
 ///
@@ -17,8 +19,8 @@ use crate::{Error, Job, Mesh, bounds::Bounds, error, traverse::frame::Domain, tr
 pub fn pack(tree: &Tree, mesh: &Mesh, job: &Job) -> Result<Structure, Error> {
     let domain = Domain::new(&mesh.bounds());
     let leaves = tree.nodes.iter().filter(|node| node.kind == Kind::Leaf).count();
-    let blocks = error::reserve(leaves, "the leaves")?;
-    let mut packer = Packer { tree, mesh, job, centre: domain.centre, nodes: Vec::new(), blocks };
+    let (blocks, nodes) = (Arena::with_capacity(leaves, "the leaves")?, Arena::with_capacity(leaves, "the nodes")?);
+    let mut packer = Packer { tree, mesh, job, centre: domain.centre, nodes, blocks };
     let packed = if tree.nodes.is_empty() { Packed::EMPTY } else { packer.subtree(0)? };
     let (nodes, blocks) = (packer.nodes, packer.blocks);
     let mut structure = Structure {
@@ -51,8 +53,8 @@ struct Packer<'a> {
     mesh: &'a Mesh,
     job: &'a Job,
     centre: Vec3,
-    nodes: Vec<Node>,
-    blocks: Vec<Block>,
+    nodes: Arena<Node>,
+    blocks: Arena<Block>,
 }
 
 impl Packer<'_> {
@@ -82,7 +84,7 @@ impl Packer<'_> {
             deepest = deepest.max(packed.stack_size);
         }
         node.set_order();
-        self.nodes[slot] = node;
+        self.nodes.as_mut_slice()[slot] = node;
         Ok(Packed { root: NodeRef::branch(slot), stack_size: children.len() - 1 + deepest })
     }
 

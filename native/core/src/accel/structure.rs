@@ -1,13 +1,16 @@
 //! The packed tree that rays walk: wide nodes, blocks of triangles, grids. Data only; builders and traversal know it,
 //! it knows neither.
 
+use bytemuck::{Pod, Zeroable};
+
 use crate::{
+    arena::Arena,
     traverse::frame::Domain,
     triangle::{Block, LANES},
 };
 
 /// A tagged index: what a child of a node is, and where.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 #[repr(transparent)]
 pub struct NodeRef(u32);
 
@@ -70,7 +73,7 @@ impl NodeRef {
 }
 
 /// Eight children with their boxes, relative to the centre of the domain.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub struct Node {
     /// `plane[k][lane]` is the lower, `plane[3 + k][lane]` the upper side along axis k; +inf and -inf where empty.
@@ -148,16 +151,16 @@ impl Grid {
 }
 
 /// A finished accelerator's data.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct Structure {
     /// Where rays begin.
     pub root: NodeRef,
     /// The arithmetic's frame of reference.
     pub domain: Domain,
     /// Wide nodes, each before its children.
-    pub nodes: Vec<Node>,
+    pub nodes: Arena<Node>,
     /// Leaves.
-    pub blocks: Vec<Block>,
+    pub blocks: Arena<Block>,
     /// Grids.
     pub grids: Vec<Grid>,
     /// For the cells of all grids, where their references begin in `references`, and after each grid's last cell

@@ -85,7 +85,7 @@ pub struct Frame {
 
 impl Frame {
     /// The frame of a ray, or `None` where the ray is not a number, not finite, or has no direction.
-    #[inline]
+    #[inline(always)]
     pub fn new(ray: &Ray, domain: &Domain) -> Option<Self> {
         let largest = ray.direction.abs().max_element();
         // Zero times anything finite is zero; times anything else it is not a number.
@@ -106,7 +106,7 @@ impl Frame {
         Some(Self { scale, ..Self::near(ray.origin, local, reach, direction, interval, domain) })
     }
 
-    #[inline]
+    #[inline(always)]
     fn near(origin: Vec3, local: Vec3, reach: f32, direction: Vec3, (tmin, tmax): (f32, f32), domain: &Domain) -> Self {
         let margin = DILATION * (reach + domain.half_extent) + f32::MIN_POSITIVE;
         let parallel = direction.abs().cmplt(Vec3::splat(PARALLEL));
@@ -170,7 +170,7 @@ impl Frame {
 }
 
 /// Sheared z is the axis along which the ray is steepest. Without branches: which axis it is cannot be predicted.
-#[inline]
+#[inline(always)]
 fn dominant_last(direction: Vec3) -> [u32; 3] {
     let a = direction.abs();
     let x = (a.x >= a.y) & (a.x >= a.z);

@@ -7,7 +7,7 @@ use crate::{
     accel::structure::{Node, NodeRef, Structure, Target},
     ray::Hit,
     simd::Simd,
-    triangle::LANES,
+    triangle::{Block, LANES},
 };
 
 /// A subtree to visit, and where the ray enters it.
@@ -89,13 +89,14 @@ pub fn trace_below<S: Simd, P: Probe, const GRIDS: bool, const ANY: bool>(
 ) {
     let simd = search.simd;
     let planes = Planes::new(simd, search.frame);
+    let (nodes, blocks): (&[Node], &[Block]) = (&structure.nodes, &structure.blocks);
     let mut depth = 0;
     let mut current = node;
     loop {
         let found = match current.target() {
             Target::Branch(index) => {
                 search.probe.step();
-                let node = &structure.nodes[index as usize];
+                let node = &nodes[index as usize];
                 let (met, near) = planes.meet(simd, node, search.best.t);
                 if met != 0 {
                     current = descend(node, met, &near, stack, &mut depth);
@@ -103,7 +104,7 @@ pub fn trace_below<S: Simd, P: Probe, const GRIDS: bool, const ANY: bool>(
                 }
                 false
             }
-            Target::Leaf { block, count } => search.block(&structure.blocks[block as usize], count),
+            Target::Leaf { block, count } => search.block(&blocks[block as usize], count),
             Target::Grid(index) if GRIDS => {
                 dda::walk::<S, P, ANY>(search, structure, mesh, &structure.grids[index as usize])
             }

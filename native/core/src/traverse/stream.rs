@@ -88,6 +88,7 @@ pub fn trace<S: Simd, const GRIDS: bool, const ANY: bool>(
     if bin.frames.is_empty() {
         return;
     }
+    let (nodes, blocks): (&[Node], &[Block]) = (&structure.nodes, &structure.blocks);
     lists.begin(structure.root, bin.frames.len());
     while let Some(visit) = lists.visits.pop() {
         let ids = visit.start as usize..(visit.start + visit.count) as usize;
@@ -98,9 +99,9 @@ pub fn trace<S: Simd, const GRIDS: bool, const ANY: bool>(
                     ray.trace::<S, GRIDS, ANY>(simd, structure, mesh, visit.node, stack);
                 }
             }
-            Target::Branch(index) => branch(simd, &structure.nodes[index as usize], octant, ids, &bin.frames, lists),
+            Target::Branch(index) => branch(simd, &nodes[index as usize], octant, ids, &bin.frames, lists),
             Target::Leaf { block, count } => {
-                let block = &structure.blocks[block as usize];
+                let block = &blocks[block as usize];
                 for &id in &lists.ids[ids] {
                     let ray = Single { frame: &mut bin.frames[id as usize], best: &mut bin.hits[id as usize] };
                     ray.block::<S, ANY>(simd, block, count);
