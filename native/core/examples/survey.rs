@@ -1,4 +1,4 @@
-//! Build and trace cost of every method over meshes: `survey [--methods a,b] [--set key=value] MESH...`, where MESH is a
+//! Build and trace cost of every method over meshes: `survey [--methods a,b] [--threads n] [--calibrate yes] [--set key=value] MESH...`, where MESH is a
 //! binary PLY file of triangles, or `soup:COUNT:SIZE`, `sphere:SUBDIVISIONS`.
 //!
 //! Nanoseconds a ray, one thread, least of three rounds: `camera` looks at the mesh from outside; `bounce` leaves the camera's hit
@@ -6,7 +6,11 @@
 
 use std::{path::Path, sync::Arc, time::Instant};
 
-use espalier_core::{Accelerator, Config, Hits, Job, Mesh, Method, ray::MISS};
+use espalier_core::{
+    Accelerator, Config, Hits, Job, Mesh, Method,
+    accel::{calibrate::calibrate, config::CostConstants},
+    ray::MISS,
+};
 use glam::Vec3;
 
 #[path = "../tests/common/mod.rs"]
@@ -22,6 +26,7 @@ fn main() {
         match option.as_str() {
             "--methods" => methods = value.split(',').map(|name| Method::from_name(name).unwrap()).collect(),
             "--threads" => threads = value.parse().unwrap(),
+            "--calibrate" => config.cost = calibrated(&value),
             "--set" => set(&mut config, value.split_once('=').expect("key=value")),
             _ => panic!("unknown option {option}"),
         }
@@ -29,6 +34,14 @@ fn main() {
     for name in arguments {
         survey(&name, &methods, &config, threads);
     }
+}
+
+/// Constants of this machine, where wanted: `--calibrate yes`.
+fn calibrated(value: &str) -> CostConstants {
+    let start = Instant::now();
+    let cost = if value == "yes" { calibrate().unwrap() } else { CostConstants::default() };
+    println!("{cost:?} in {:.0} ms", start.elapsed().as_secs_f64() * 1e3);
+    cost
 }
 
 fn set(config: &mut Config, (key, value): (&str, &str)) {

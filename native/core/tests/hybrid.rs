@@ -16,7 +16,7 @@ use espalier_core::{
     },
 };
 
-const HYBRIDS: [Method; 1] = [Method::HybridSampled];
+const HYBRIDS: [Method; 2] = [Method::HybridSampled, Method::HybridCost];
 
 fn mesh((vertices, triangles): (Vec<glam::Vec3>, Vec<[u32; 3]>)) -> Arc<Mesh> {
     Arc::new(Mesh::new(vertices, triangles).unwrap())
@@ -59,6 +59,26 @@ fn the_sampled_verdict_follows_from_its_evidence() {
             assert_eq!(window && is_uniform, decision.verdict == Verdict::Grid, "{decision:?}");
         }
     }
+}
+
+#[test]
+fn the_expected_cost_decides() {
+    let config = Config { grid_least_triangles: 40, grid_most_triangles: 4000, ..eager() };
+    for mesh in [mesh(soup(9000, 0.05)), mesh(icosphere(4))] {
+        let accelerator = build(&mesh, Method::HybridCost, &config, 2);
+        for decision in accelerator.decisions().iter().filter(|decision| decision.rays > 0) {
+            let gain = decision.cost_bvh * config.grid_gain as f32;
+            assert!(decision.cost_grid > 0.0 && decision.cost_bvh > 0.0);
+            assert_eq!(decision.verdict == Verdict::Grid, decision.cost_grid < gain, "{decision:?}");
+        }
+    }
+}
+
+#[test]
+fn no_grid_is_built_for_rays_that_never_come() {
+    let config = Config { expected_rays: 0.0, ..eager() };
+    let accelerator = build(&mesh(soup(2000, 0.1)), Method::HybridCost, &config, 2);
+    assert_eq!(accelerator.census().grids, 0);
 }
 
 #[test]

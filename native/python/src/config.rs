@@ -58,7 +58,7 @@ macro_rules! real {
 }
 
 /// Every setting, by name.
-const FIELDS: [(&str, Readers, Field); 18] = [
+const FIELDS: [(&str, Readers, Field); 19] = [
     ("seed", Readers::All, whole!(seed)),
     ("expected_rays", Readers::All, real!(expected_rays)),
     ("leaf_size", Readers::All, whole!(leaf_size)),
@@ -72,6 +72,7 @@ const FIELDS: [(&str, Readers, Field); 18] = [
     ("spread_threshold", Readers::Sampled, real!(spread_threshold)),
     ("grid_least_triangles", Readers::Hybrids, whole!(grid_least_triangles)),
     ("grid_most_triangles", Readers::Hybrids, whole!(grid_most_triangles)),
+    ("grid_gain", Readers::Cost, real!(grid_gain)),
     ("node_ns", Readers::Cost, real!(cost.node_ns)),
     ("block_ns", Readers::Cost, real!(cost.block_ns)),
     ("cell_ns", Readers::Cost, real!(cost.cell_ns)),

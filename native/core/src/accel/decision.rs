@@ -33,9 +33,10 @@ pub struct Decision {
     pub hit_threshold: f32,
     /// Greatest spread of a uniform node.
     pub spread_threshold: f32,
-    /// Expected nanoseconds of building the node as a grid and tracing the rays to come through it.
+    /// Expected nanoseconds of building the node as a grid and tracing the rays to come through it. Where even a grid
+    /// that holds nothing but the hits would not pay, none was built, and this is the cost of that one.
     pub cost_grid: f32,
-    /// Expected nanoseconds of tracing the rays to come through the node's subtree.
+    /// Expected nanoseconds of tracing the rays to come through the node's subtree, which exists already.
     pub cost_bvh: f32,
     /// What it became.
     pub verdict: Verdict,

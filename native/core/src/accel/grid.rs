@@ -47,12 +47,13 @@ pub fn resolution(bounds: &Bounds, count: usize, density: f64, most_cells: usize
     cells.map(|c| c as u32)
 }
 
-/// Items are rasterised in parts of this many, which are also the steps between looks at the job.
+/// Items are rasterised and sorted in parts of this many.
 const PART: usize = 1 << 14;
 
 /// Build a grid over `items`, which lie within `bounds`.
 ///
 /// A cell lists every triangle that comes within the domain's margin of it, so that rounding in the walk is harmless.
+/// Every item counts `units` in the job's progress.
 ///
 /// # Errors
 /// [`Error::Cancelled`], [`Error::OutOfMemory`].
@@ -63,19 +64,29 @@ pub fn build(
     items: &[Item],
     resolution: [u32; 3],
     job: &Job,
+    units: u64,
 ) -> Result<BuiltGrid, Error> {
     let raster = Raster::new(domain, bounds, resolution);
     let parts: Vec<Vec<[u32; 2]>> = items
         .par_chunks(PART)
         .map(|part| {
-            job.check()?;
-            Ok(part.iter().flat_map(|item| raster.cells_of(mesh, item)).collect())
+            let mut pairs = Vec::new();
+            for item in part {
+                // One item may fill all cells, so even a part is too long to wait for.
+                job.check()?;
+                pairs.extend(raster.cells_of(mesh, item));
+            }
+            job.advance(units * part.len() as u64);
+            Ok(pairs)
         })
         .collect::<Result<_, Error>>()?;
     let grid = raster.grid;
     let (starts, references) = sort_by_cell(&parts, grid.cell_count(), job)?;
     Ok(BuiltGrid { grid, starts, references })
 }
+
+/// Cells or pairs that are gone through between two looks at the job: some milliseconds.
+const STEP: usize = 1 << 20;
 
 /// A counting sort of (cell, triangle) pairs that keeps their order within a cell.
 fn sort_by_cell(parts: &[Vec<[u32; 2]>], cell_count: usize, job: &Job) -> Result<(Vec<u32>, Vec<u32>), Error> {
@@ -84,19 +95,22 @@ fn sort_by_cell(parts: &[Vec<[u32; 2]>], cell_count: usize, job: &Job) -> Result
         return Err(Error::OutOfMemory { what: "the references of a grid's cells", bytes: total * 4 });
     }
     let mut starts = error::filled(cell_count + 1, 0u32, "the cells of a grid")?;
-    for part in parts {
+    for pairs in parts.iter().flat_map(|part| part.chunks(STEP)) {
         job.check()?;
-        part.iter().for_each(|&[cell, _]| starts[cell as usize] += 1);
+        pairs.iter().for_each(|&[cell, _]| starts[cell as usize] += 1);
     }
     let mut end = 0;
-    for start in &mut starts {
-        end += *start;
-        *start = end;
+    for row in starts.chunks_mut(STEP) {
+        job.check()?;
+        for start in row {
+            end += *start;
+            *start = end;
+        }
     }
     let mut references = error::filled(total, 0u32, "the references of a grid's cells")?;
-    for part in parts.iter().rev() {
+    for pairs in parts.iter().rev().flat_map(|part| part.rchunks(STEP)) {
         job.check()?;
-        for &[cell, primitive] in part.iter().rev() {
+        for &[cell, primitive] in pairs.iter().rev() {
             let start = &mut starts[cell as usize];
             *start -= 1;
             references[*start as usize] = primitive;

@@ -7,11 +7,15 @@ use super::{
     config::Config,
     decision::{Decision, Verdict},
     grid::{self, BuiltGrid},
-    sample::{self, Samples},
+    sample::{self, Evidence, Samples},
     subtree::Walker,
     tree::{Kind, Tree, TreeNode},
 };
-use crate::{Error, Job, Mesh, ray::MISS, traverse::frame::Domain};
+use crate::{
+    Error, Job, Mesh,
+    ray::MISS,
+    traverse::frame::{Domain, Frame},
+};
 
 /// Everything a verdict may depend on.
 pub struct Inquiry<'a> {
@@ -127,16 +131,30 @@ impl Inquiry<'_> {
         Samples::new(bounds, count, self.config.seed, index)
     }
 
+    /// The frames of sample rays.
+    ///
+    /// # Errors
+    /// None; the signature is that of the rays' own checks, which samples pass.
+    pub fn frames(&self, samples: &Samples) -> Result<Vec<Frame>, Error> {
+        let rays = samples.rays()?;
+        (0..rays.len()).map(|ray| rays.frame(ray, &self.domain)).collect()
+    }
+
+    /// The cells of the grid that the node would become.
+    pub fn resolution(&self, index: usize) -> [u32; 3] {
+        let node = &self.tree.nodes[index];
+        let Config { grid_density, grid_most_cells, .. } = *self.config;
+        grid::resolution(&node.bounds, node.count as usize, grid_density, grid_most_cells)
+    }
+
     /// The grid that the node would become.
     ///
     /// # Errors
     /// [`Error::Cancelled`], [`Error::OutOfMemory`].
     pub fn grid(&self, index: usize) -> Result<BuiltGrid, Error> {
         let node = &self.tree.nodes[index];
-        let Config { grid_density, grid_most_cells, .. } = *self.config;
-        let resolution = grid::resolution(&node.bounds, node.count as usize, grid_density, grid_most_cells);
         let items = self.tree.items_of(node);
-        grid::build(self.mesh, &self.domain, &node.bounds, items, resolution, self.job)
+        grid::build(self.mesh, &self.domain, &node.bounds, items, self.resolution(index), self.job, 0)
     }
 }
 
@@ -155,22 +173,23 @@ impl Judge for Sampled {
     fn judge(&self, inquiry: &Inquiry<'_>, index: usize, decision: &mut Decision) -> Result<Option<BuiltGrid>, Error> {
         let Config { hit_threshold, spread_threshold, .. } = *inquiry.config;
         let samples = inquiry.samples(index);
-        let rays = samples.rays()?;
         let mut walker = Walker::new(inquiry.tree, inquiry.mesh, &inquiry.domain);
-        let hits: Vec<bool> = (0..rays.len())
-            .map(|ray| {
-                // A box too small for a direction in single precision has no frame: nothing to hit.
-                let frame = rays.frame(ray, &inquiry.domain);
-                frame.is_ok_and(|frame| walker.trace::<true>(index, &frame).primitive != MISS)
-            })
-            .collect();
+        let frames = inquiry.frames(&samples)?;
+        let hits: Vec<bool> = frames.iter().map(|frame| walker.trace::<true>(index, frame).primitive != MISS).collect();
         let evidence = samples.evidence(|ray| hits[ray]);
-        decision.rays = evidence.rays as u32;
-        decision.hits = evidence.hits as u32;
-        decision.spread = evidence.spread as f32;
+        decision.observe(&evidence);
         decision.hit_threshold = hit_threshold as f32;
         decision.spread_threshold = spread_threshold as f32;
         let is_uniform = evidence.share() >= hit_threshold && evidence.spread <= spread_threshold;
         is_uniform.then(|| inquiry.grid(index)).transpose()
+    }
+}
+
+impl Decision {
+    /// Keep what the sample rays told.
+    pub(super) fn observe(&mut self, evidence: &Evidence) {
+        self.rays = evidence.rays as u32;
+        self.hits = evidence.hits as u32;
+        self.spread = evidence.spread as f32;
     }
 }

@@ -1,10 +1,12 @@
 //! Accelerators: one structure of branches, leaves and grids, and the methods that decide which is where.
 
+pub mod calibrate;
 pub mod cells;
 pub mod census;
 pub mod check;
 pub mod config;
 pub mod decision;
+pub mod expected;
 pub mod grid;
 pub mod hybrid;
 pub mod median;
@@ -205,10 +207,11 @@ struct Builder<'a> {
 impl Builder<'_> {
     fn structure(&mut self, method: Method) -> Result<Structure, Error> {
         let tree = match method {
-            Method::BvhSah => self.hierarchy(&sah::BinnedSah { bins: self.config.sah_bins })?,
+            Method::BvhSah => self.hierarchy(&sah::BinnedSah { bins: self.config.sah_bins, job: self.job })?,
             Method::Grid => self.single_grid()?,
-            Method::BvhMedian | Method::HybridCost => self.hierarchy(&median::CyclingMedian)?,
+            Method::BvhMedian => self.hierarchy(&median::CyclingMedian { job: self.job })?,
             Method::HybridSampled => self.hybrid(&hybrid::Sampled)?,
+            Method::HybridCost => self.hybrid(&expected::ExpectedCost)?,
         };
         self.timed("pack", |this| pack::pack(&tree, this.mesh, this.job))
     }
@@ -219,7 +222,7 @@ impl Builder<'_> {
     }
 
     fn hybrid(&mut self, judge: &impl hybrid::Judge) -> Result<Tree, Error> {
-        let tree = self.hierarchy(&median::CyclingMedian)?;
+        let tree = self.hierarchy(&median::CyclingMedian { job: self.job })?;
         let (tree, decisions) =
             self.timed("verdicts", |this| hybrid::decide(tree, this.mesh, this.config, judge, this.job))?;
         self.decisions = decisions;
@@ -232,7 +235,6 @@ impl Builder<'_> {
             return Ok(Tree::default());
         }
         let grid = self.timed("grid", |this| this.grid(&items))?;
-        self.job.advance(items.len() as u64);
         let root = TreeNode { bounds: self.mesh.bounds(), first: 0, count: items.len() as u32, kind: Kind::Grid(0) };
         Ok(Tree { nodes: vec![root], items, grids: vec![grid] })
     }
@@ -241,7 +243,7 @@ impl Builder<'_> {
         let bounds = self.mesh.bounds();
         let Config { grid_density, grid_most_cells, .. } = *self.config;
         let resolution = grid::resolution(&bounds, items.len(), grid_density, grid_most_cells);
-        grid::build(self.mesh, &Domain::new(&bounds), &bounds, items, resolution, self.job)
+        grid::build(self.mesh, &Domain::new(&bounds), &bounds, items, resolution, self.job, 1)
     }
 
     fn timed<T>(&mut self, name: &'static str, work: impl FnOnce(&mut Self) -> Result<T, Error>) -> Result<T, Error> {

@@ -7,8 +7,15 @@ use glam::Vec3;
 #[derive(Debug, Clone, Copy)]
 pub struct Separator {
     corners: [Vec3; 3],
+    /// In units of about the longest: only their directions matter, and products of huge or tiny ones would leave the
+    /// range of single precision, which made a cell list everything near.
     edges: [Vec3; 3],
     normal: Vec3,
+}
+
+/// A power of two that brings a positive number into [1, 2), or nearer to it where that one is out of range.
+fn inverse_power(number: f32) -> f32 {
+    f32::from_bits((254 - (number.to_bits() >> 23)).max(1) << 23)
 }
 
 impl Separator {
@@ -16,6 +23,8 @@ impl Separator {
     pub fn new(corners: [Vec3; 3]) -> Self {
         let [a, b, c] = corners;
         let edges = [b - a, c - b, a - c];
+        let scale = inverse_power(edges.iter().fold(Vec3::ZERO, |longest, edge| longest.max(edge.abs())).max_element());
+        let edges = edges.map(|edge| edge * scale);
         Self { corners, edges, normal: edges[0].cross(edges[1]) }
     }
 
@@ -49,5 +58,18 @@ mod tests {
         let cell = |x: f32, y: f32| triangle.overlaps(Vec3::new(x + 0.5, y + 0.5, 0.5), Vec3::splat(0.5));
         assert!(cell(0.0, 0.0) && cell(1.0, 2.0) && cell(3.0, 0.0) && cell(2.0, 2.0));
         assert!(!cell(3.0, 3.0) && !cell(3.0, 2.0));
+    }
+
+    #[test]
+    fn scale_does_not_matter() {
+        for scale in [1e-36, 1e-20, 1.0, 1e16, 2e17] {
+            let corners = [Vec3::new(0.0, 0.0, 0.5), Vec3::new(4.0, 0.0, 0.5), Vec3::new(0.0, 4.0, 0.5)];
+            let triangle = Separator::new(corners.map(|corner| corner * scale));
+            let cell = |x: f32, y: f32, z: f32| {
+                triangle.overlaps(Vec3::new(x + 0.5, y + 0.5, z) * scale, Vec3::splat(0.5) * scale)
+            };
+            assert!(cell(0.0, 0.0, 0.5) && cell(1.0, 2.0, 0.5));
+            assert!(!cell(3.0, 3.0, 0.5) && !cell(1.0, 1.0, 1.1));
+        }
     }
 }

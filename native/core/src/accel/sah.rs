@@ -8,13 +8,15 @@ use super::{
     median,
     tree::{Item, Split},
 };
-use crate::{bounds::Bounds, triangle::LANES};
+use crate::{Job, bounds::Bounds, triangle::LANES};
 
 /// Splits at the cheapest of the planes between bins along all axes.
 #[derive(Debug, Clone, Copy)]
-pub struct BinnedSah {
+pub struct BinnedSah<'a> {
     /// Bins per axis, at most [`MOST_BINS`].
     pub bins: usize,
+    /// May cancel large splits halfway.
+    pub job: &'a Job,
 }
 
 /// More bins than this do not pay.
@@ -61,17 +63,17 @@ struct Plane {
     cost: f32,
 }
 
-impl Split for BinnedSah {
+impl Split for BinnedSah<'_> {
     fn split(&self, items: &mut [Item], depth: usize) -> usize {
         let plane = if depth < MOST_DEPTH { self.best_plane(items) } else { None };
         match plane {
             Some((plane, mapping)) => partition(items, |item| mapping.bin(item, plane.axis) < plane.bin),
-            None => median::halve(items, depth % 3),
+            None => median::halve(items, depth % 3, self.job),
         }
     }
 }
 
-impl BinnedSah {
+impl BinnedSah<'_> {
     fn best_plane(&self, items: &[Item]) -> Option<(Plane, Mapping)> {
         let mapping = Mapping::new(items, self.bins);
         let bins = if items.len() <= PART {

@@ -30,18 +30,18 @@ pub fn ray_count(node: &Bounds, scene: &Bounds, config: &Config) -> usize {
 
 /// A counter-based generator: value `i` of a stream is a hash of key and `i` (SplitMix64: Steele, Lea and Flood, "Fast
 /// Splittable Pseudorandom Number Generators", OOPSLA 2014).
-struct Generator {
+pub(super) struct Generator {
     key: u64,
     counter: u64,
 }
 
 impl Generator {
-    fn new(seed: u64, stream: u64) -> Self {
+    pub(super) fn new(seed: u64, stream: u64) -> Self {
         Self { key: mix(mix(seed).wrapping_add(stream)), counter: 0 }
     }
 
     /// Uniform in [0, 1).
-    fn uniform(&mut self) -> f64 {
+    pub(super) fn uniform(&mut self) -> f64 {
         self.counter += 1;
         let bits = mix(self.key.wrapping_add(self.counter.wrapping_mul(0x9e37_79b9_7f4a_7c15)));
         (bits >> 11) as f64 / (1u64 << 53) as f64
@@ -153,7 +153,9 @@ impl Samples {
         let origin = surface.point(face, place);
         let other = surface.other_face(face, generator.uniform());
         let target = surface.point(other, [generator.uniform(), generator.uniform()]);
-        let values = [origin.as_vec3(), (target - origin).as_vec3()].map(|value| value.to_array());
+        // Of unit length, so that no box is too small for its directions.
+        let direction = (target - origin).normalize_or(DVec3::X);
+        let values = [origin.as_vec3(), direction.as_vec3()].map(|value| value.to_array());
         self.columns.iter_mut().zip(values.as_flattened()).for_each(|(column, &value)| column.push(value));
     }
 
@@ -240,15 +242,11 @@ mod tests {
         let samples = Samples::new(&bounds, 500, 7, 3);
         let rays = samples.rays().unwrap();
         assert_eq!(rays.len(), 500);
-        let faces = |point: Vec3| {
-            let sides = (point - bounds.lower).abs().min((point - bounds.upper).abs());
-            assert!((point - point.clamp(bounds.lower, bounds.upper)).length() < 1e-5);
-            sides.to_array().map(|distance| distance < 1e-5)
-        };
+        let inside = |point: Vec3| (point - point.clamp(bounds.lower, bounds.upper)).length() < 1e-6;
         for ray in (0..500).map(|i| rays.get(i)) {
-            let (origin, target) = (faces(ray.origin), faces(ray.origin + ray.direction));
-            assert!(origin.contains(&true) && target.contains(&true));
-            assert!(ray.direction.abs().max_element() > 0.0);
+            let sides = (ray.origin - bounds.lower).abs().min((ray.origin - bounds.upper).abs());
+            assert!(sides.min_element() < 1e-6 && inside(ray.origin));
+            assert!(inside(ray.origin + ray.direction * 1e-4) && ray.direction.is_normalized());
         }
     }
 

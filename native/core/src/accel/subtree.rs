@@ -12,15 +12,23 @@ use crate::{
 };
 
 /// Levels of the binary tree that one wide node stands for: it has 2^3 children.
-const LEVELS_PER_NODE: u32 = 3;
+const LEVELS_PER_NODE: f64 = 3.0;
 
-/// What queries cost, in what the packed tree would have done.
+/// What queries did.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Work {
-    /// Wide nodes: branches visited at every third level below the root of the query.
-    pub nodes: u64,
-    /// Leaves.
+    /// Branches of the binary tree visited.
+    pub branches: u64,
+    /// Leaves visited.
     pub blocks: u64,
+}
+
+impl Work {
+    /// How many wide nodes the packed tree would have visited, about: where wide nodes begin is settled only by
+    /// packing, and over all levels at which they could, this is the mean.
+    pub fn nodes(&self) -> f64 {
+        self.branches as f64 / LEVELS_PER_NODE
+    }
 }
 
 /// Queries of subtrees, one after the other.
@@ -36,7 +44,6 @@ pub struct Walker<'a> {
 #[derive(Clone, Copy)]
 struct Entry {
     node: u32,
-    level: u32,
     near: f32,
 }
 
@@ -50,15 +57,15 @@ impl<'a> Walker<'a> {
     pub fn trace<const ANY: bool>(&mut self, root: usize, frame: &Frame) -> Hit {
         let mut best = Hit { t: frame.tmax, ..Hit::MISS };
         self.stack.clear();
-        self.meet(root, 0, frame, best.t);
+        self.meet(root, frame, best.t);
         while let Some(entry) = self.stack.pop() {
             if entry.near > best.t {
                 continue;
             }
             match self.tree.children(entry.node as usize) {
                 Some(children) => {
-                    self.work.nodes += u64::from(entry.level.is_multiple_of(LEVELS_PER_NODE));
-                    self.meet_both(children, entry.level + 1, frame, best.t);
+                    self.work.branches += 1;
+                    self.meet_both(children, frame, best.t);
                 }
                 None => {
                     self.work.blocks += 1;
@@ -73,10 +80,10 @@ impl<'a> Walker<'a> {
     }
 
     /// Put the children that the ray meets on the stack, the nearer one on top.
-    fn meet_both(&mut self, [left, right]: [usize; 2], level: u32, frame: &Frame, limit: f32) {
+    fn meet_both(&mut self, [left, right]: [usize; 2], frame: &Frame, limit: f32) {
         let height = self.stack.len();
-        self.meet(left, level, frame, limit);
-        self.meet(right, level, frame, limit);
+        self.meet(left, frame, limit);
+        self.meet(right, frame, limit);
         if let [first, second] = &mut self.stack[height..]
             && first.near < second.near
         {
@@ -84,9 +91,9 @@ impl<'a> Walker<'a> {
         }
     }
 
-    fn meet(&mut self, node: usize, level: u32, frame: &Frame, limit: f32) {
+    fn meet(&mut self, node: usize, frame: &Frame, limit: f32) {
         if let Some(near) = enter(&self.tree.nodes[node].bounds, self.centre, frame, limit) {
-            self.stack.push(Entry { node: node as u32, level, near });
+            self.stack.push(Entry { node: node as u32, near });
         }
     }
 
@@ -108,6 +115,12 @@ impl<'a> Walker<'a> {
 /// Where the ray enters a dilated box, if it does before `limit`: the test of [`crate::traverse`]'s nodes.
 #[inline]
 fn enter(bounds: &Bounds, centre: Vec3, frame: &Frame, limit: f32) -> Option<f32> {
+    cross(bounds, centre, frame, limit).map(|[near, _]| near)
+}
+
+/// Where the ray enters and leaves a dilated box, if it enters before `limit`, which also ends it.
+#[inline]
+pub fn cross(bounds: &Bounds, centre: Vec3, frame: &Frame, limit: f32) -> Option<[f32; 2]> {
     let (lower, upper) = (bounds.lower - centre, bounds.upper - centre);
     let (mut near, mut far) = (frame.tmin, limit);
     for k in 0..3 {
@@ -115,5 +128,5 @@ fn enter(bounds: &Bounds, centre: Vec3, frame: &Frame, limit: f32) -> Option<f32
         near = near.max(first * frame.inverse[k] + frame.near_bias[k]);
         far = far.min(last * frame.inverse[k] + frame.far_bias[k]);
     }
-    (near <= far).then_some(near)
+    (near <= far).then_some([near, far])
 }

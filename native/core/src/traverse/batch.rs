@@ -58,8 +58,16 @@ impl<'a> Tracer<'a> {
     /// # Errors
     /// [`Error::Ray`] for the first unusable ray.
     pub fn counted(self, rays: &Rays<'_>, counts: &mut [Counts]) -> Result<(), Error> {
-        assert_eq!(rays.len(), counts.len());
-        let take = |index: usize, _: &Frame, _: Hit, seen: Counts| counts[index] = seen;
+        self.probed(rays, counts)
+    }
+
+    /// What a probe of any kind sees of the closest-hit query of every ray, on the calling thread.
+    ///
+    /// # Errors
+    /// [`Error::Ray`] for the first unusable ray.
+    pub(crate) fn probed<P: Probe + Default>(self, rays: &Rays<'_>, probes: &mut [P]) -> Result<(), Error> {
+        assert_eq!(rays.len(), probes.len());
+        let take = |index: usize, _: &Frame, _: Hit, seen: P| probes[index] = seen;
         self.with_room(|room| {
             self.level.run(Singles { tracer: self, rays, any: false, take, room, probe: PhantomData })
         })

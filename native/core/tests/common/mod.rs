@@ -195,7 +195,7 @@ pub fn eager() -> Config {
         grid_most_triangles: 100,
         hit_threshold: 0.3,
         spread_threshold: f64::INFINITY,
-        cost: CostConstants { node_ns: 50.0, block_ns: 50.0, reference_ns: 0.0, ..CostConstants::default() },
+        cost: CostConstants { node_ns: 50.0, block_ns: 50.0, cell_ns: 1.0, gather_ns: 1.0, reference_ns: 0.0 },
         ..Config::default()
     }
 }
