@@ -139,7 +139,7 @@ def test_a_folder_that_cannot_be_written_is_one_line_and_status_2(tmp_path: Path
 
 def workers(parent: int) -> list[int]:
     """The second Blenders that have this parent."""
-    command = ["ps", "-o", "pid=,args=", "--ppid", str(parent)]
+    command = ["ps", "-ww", "-o", "pid=,args=", "--ppid", str(parent)]
     lines = subprocess.run(command, capture_output=True, text=True, check=False).stdout.splitlines()
     return [int(line.split()[0]) for line in lines if "cycles_worker" in line]
 
