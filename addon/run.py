@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from . import methods, native
+from . import calibration, methods, native
 from .errors import EspalierAddonError
 from .scene_data import SceneData
 
@@ -168,9 +168,11 @@ class Run:
         return MethodResult(name, accelerator, accelerator.census(), render)
 
     def _config(self, name: str) -> dict[str, Any]:
-        """Seed and expected rays, for the methods that know them."""
+        """Seed, expected rays and this machine's costs, for the methods that know them."""
         width, height = self.data.camera.resolution
         expected_rays = self.options.expected_rays or float(width * height * self.options.samples)
-        wanted = {"seed": self.options.seed, "expected_rays": expected_rays}
+        wanted: dict[str, Any] = {"seed": self.options.seed, "expected_rays": expected_rays}
         known = self._native.default_config(name)
+        if "node_ns" in known:
+            wanted |= calibration.cost_constants()
         return {key: value for key, value in wanted.items() if key in known}

@@ -96,6 +96,17 @@ pub fn to_dict<'py>(py: Python<'py>, method: Method, config: &Config) -> PyResul
     Ok(dict)
 }
 
+/// The settings that say what a traversal costs.
+pub fn costs<'py>(py: Python<'py>, config: &Config) -> PyResult<Bound<'py, PyDict>> {
+    let dict = PyDict::new(py);
+    for (name, _, field) in const { &FIELDS }.iter().filter(|(name, _, _)| name.ends_with("_ns")) {
+        if let Field::Real(get, _) = field {
+            dict.set_item(name, get(config))?;
+        }
+    }
+    Ok(dict)
+}
+
 /// The default settings, with those of a mapping instead.
 ///
 /// # Errors

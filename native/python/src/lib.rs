@@ -32,7 +32,7 @@ mod espalier_rt {
         accelerator::Accelerator,
         camera::Camera,
         cells::Cells,
-        functions::{default_config, instruction_set, methods},
+        functions::{calibrated, default_config, instruction_set, methods},
         hits::Hits,
         job::Job,
         mesh::Mesh,
