@@ -150,7 +150,7 @@ def test_a_cancelled_job_stops_all_that_is_given_it() -> None:
         rt.Accelerator.build(mesh).closest(*rays_through(mesh, 10), job=job)
 
 
-@pytest.mark.parametrize("method", [method for method in METHODS if method != "hybrid-cost"])
+@pytest.mark.parametrize("method", METHODS)
 def test_progress_of_a_build_rises_to_one(method: str) -> None:
     mesh, job, seen = soup(count=200_000), rt.Job(), []
     thread = threading.Thread(target=lambda: rt.Accelerator.build(mesh, method, job=job))
