@@ -6,6 +6,7 @@ One way of drawing serves the shell and Blender's own Python, which has no packa
 import contextlib
 import ctypes
 import os
+import sys
 import tempfile
 import time
 from collections.abc import Iterator
@@ -59,6 +60,7 @@ def own_streams() -> Iterator[tuple[TextIO, TextIO]]:
 
     Blender tells of every file it reads and writes, and of every step of Cycles; none of it is for our user.
     """
+    _flush()
     kept = [os.dup(descriptor) for descriptor in (1, 2)]
     streams = [os.fdopen(os.dup(descriptor), "w", encoding="utf-8", errors="replace") for descriptor in kept]
     with tempfile.TemporaryFile() as scratch:
@@ -67,7 +69,7 @@ def own_streams() -> Iterator[tuple[TextIO, TextIO]]:
         try:
             yield streams[0], streams[1]
         finally:
-            _flush_c()
+            _flush()
             for descriptor, original in zip((1, 2), kept, strict=True):
                 os.dup2(original, descriptor)
                 os.close(original)
@@ -75,7 +77,12 @@ def own_streams() -> Iterator[tuple[TextIO, TextIO]]:
                 stream.close()
 
 
-def _flush_c() -> None:
-    """Write out what C holds back of its standard streams, as it does where they are no terminal."""
+def _flush() -> None:
+    """Write out what Python and C hold back of their standard streams, as both do where they are no terminal.
+
+    Blender prints its operators' reports through Python, everything else through C.
+    """
+    sys.stdout.flush()
+    sys.stderr.flush()
     c = ctypes.CDLL("ucrtbase" if os.name == "nt" else None)
     c.fflush(None)
