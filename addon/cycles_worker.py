@@ -6,6 +6,7 @@ It stands alone, as Blender runs it: `blender --python cycles_worker.py -- JOB.j
 `NAME.npy` as the scene's view transform shows it, as `NAME.display.npy` (h, w, 3) uint8.
 """
 
+import contextlib
 import json
 import os
 import re
@@ -146,7 +147,8 @@ if __name__ == "__main__":
         main(sys.argv[sys.argv.index("--") + 1])
         status = 0
     except BaseException:  # noqa: BLE001 - shown, and told by the status
-        traceback.print_exc()
+        with contextlib.suppress(OSError):  # nobody reads it where the parent is gone
+            traceback.print_exc()
+            sys.stderr.flush()
     finally:
-        sys.stderr.flush()
-        os._exit(status)  # a plain exit waits for the thread that reads stdin
+        os._exit(status)  # a plain exit takes bpy apart, which can hang, and waits for the thread that reads stdin
