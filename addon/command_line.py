@@ -14,7 +14,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
-from . import catalogue, input_kinds
+from . import catalogue, input_kinds, native
 from .errors import EspalierAddonError
 from .images import write_png
 from .methods import METHOD_NAMES
@@ -193,13 +193,8 @@ def _blender() -> Iterator[None]:
 
 
 def _expected_errors() -> tuple[type[Exception], ...]:
-    """Errors whose message tells the user what to do."""
-    from . import native
-
-    errors: tuple[type[Exception], ...] = (EspalierAddonError, catalogue.module("errors").SceneCatalogueError)
-    with contextlib.suppress(EspalierAddonError):
-        errors += (native.module().EspalierError,)
-    return errors
+    """Errors whose message tells the user what to do: the add-on's, the core's and the catalogue's."""
+    return (*native.expected_errors(), catalogue.module("errors").SceneCatalogueError)
 
 
 _handle: Any = None

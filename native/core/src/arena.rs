@@ -17,6 +17,11 @@ pub struct Arena<T> {
 }
 
 impl<T: Pod> Arena<T> {
+    /// Room for nothing.
+    pub fn empty() -> Self {
+        Self { map: None, len: 0, values: PhantomData }
+    }
+
     /// Room for `capacity` values.
     ///
     /// # Errors
@@ -24,7 +29,7 @@ impl<T: Pod> Arena<T> {
     pub fn with_capacity(capacity: usize, what: &'static str) -> Result<Self, Error> {
         let bytes = capacity * size_of::<T>();
         let map = if bytes == 0 { None } else { Some(reserve(bytes, what)?) };
-        Ok(Self { map, len: 0, values: PhantomData })
+        Ok(Self { map, ..Self::empty() })
     }
 
     /// Append a value; there must be room.

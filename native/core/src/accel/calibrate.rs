@@ -77,7 +77,7 @@ impl Subject {
         let samples = Samples::new(&mesh.bounds(), RAYS, 0, 0);
         let mut subject = Self { mesh, samples, setup_ns: 0.0 };
         let grid = grid::build(&subject.mesh, &subject.domain(), &subject.mesh.bounds(), &[], [1; 3], &Job::new(), 0)?;
-        let nothing = Structure { root: NodeRef::EMPTY, ..expected::alone(grid, subject.domain())? };
+        let nothing = Structure { root: NodeRef::EMPTY, ..expected::alone(grid, subject.domain()) };
         subject.setup_ns = subject.trace_ns(&nothing)?;
         Ok(subject)
     }
@@ -106,7 +106,7 @@ impl Subject {
         let start = Instant::now();
         let built = grid::build(&self.mesh, &self.domain(), &bounds, &items, resolution, &Job::new(), 0)?;
         let build_ns = start.elapsed().as_secs_f64() * 1e9 / built.references.len().max(1) as f64;
-        let structure = expected::alone(built, self.domain())?;
+        let structure = expected::alone(built, self.domain());
         let walks = expected::walks(&structure, &self.mesh, &self.samples)?;
         let nanoseconds = self.trace_ns(&structure)? - self.setup_ns;
         Ok((Time { counts: [walks.cells as f64, walks.groups as f64], nanoseconds }, build_ns))

@@ -128,7 +128,7 @@ impl Probe for Walks {
 
 /// What sample rays do in a grid, by a walk through the real one.
 fn counted(grid: BuiltGrid, inquiry: &Inquiry<'_>, samples: &Samples) -> Result<(BuiltGrid, Walks), Error> {
-    let structure = alone(grid, inquiry.domain)?;
+    let structure = alone(grid, inquiry.domain);
     let walks = walks(&structure, inquiry.mesh, samples)?;
     let Structure { mut grids, starts, references, .. } = structure;
     let grid = grids.swap_remove(0);
@@ -136,15 +136,10 @@ fn counted(grid: BuiltGrid, inquiry: &Inquiry<'_>, samples: &Samples) -> Result<
 }
 
 /// A structure of one grid.
-///
-/// # Errors
-/// None: nothing is allocated.
-pub fn alone(grid: BuiltGrid, domain: Domain) -> Result<Structure, Error> {
+pub fn alone(grid: BuiltGrid, domain: Domain) -> Structure {
     let BuiltGrid { grid, starts, references } = grid;
-    let nodes = Arena::with_capacity(0, "the nodes")?;
-    let blocks = Arena::with_capacity(0, "the leaves")?;
-    let (root, grids) = (NodeRef::grid(0), vec![grid]);
-    Ok(Structure { root, domain, nodes, blocks, grids, starts, references, stack_size: 0 })
+    let (root, nodes, blocks, grids) = (NodeRef::grid(0), Arena::empty(), Arena::empty(), vec![grid]);
+    Structure { root, domain, nodes, blocks, grids, starts, references, stack_size: 0 }
 }
 
 /// What sample rays do in a structure of one grid. Counts are the same on every instruction set.
