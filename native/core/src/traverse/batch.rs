@@ -40,7 +40,7 @@ impl<'a> Tracer<'a> {
     pub fn closest(self, rays: &Rays<'_>, hits: &mut HitsMut<'_>) -> Result<(), Error> {
         assert_eq!(rays.len(), hits.len());
         let take = |index, frame: &Frame, hit: Hit| hits.set(index, in_ray_units(frame, hit));
-        self.silent(rays, false, take)
+        self.silent::<false>(rays, take)
     }
 
     /// Whether anything lies in the interval of every ray, on the calling thread.
@@ -50,7 +50,7 @@ impl<'a> Tracer<'a> {
     pub fn occluded(self, rays: &Rays<'_>, occluded: &mut [bool]) -> Result<(), Error> {
         assert_eq!(rays.len(), occluded.len());
         let take = |index: usize, _: &Frame, hit: Hit| occluded[index] = hit.primitive != MISS;
-        self.silent(rays, true, take)
+        self.silent::<true>(rays, take)
     }
 
     /// What the closest-hit query of every ray costs where it walks alone, on the calling thread.
@@ -69,17 +69,17 @@ impl<'a> Tracer<'a> {
         assert_eq!(rays.len(), probes.len());
         let take = |index: usize, _: &Frame, _: Hit, seen: P| probes[index] = seen;
         self.with_room(|room| {
-            self.level.run(Singles { tracer: self, rays, any: false, take, room, probe: PhantomData })
+            self.level.run(Singles::<_, _, false> { tracer: self, rays, take, room, probe: PhantomData })
         })
     }
 
-    fn silent(self, rays: &Rays<'_>, any: bool, mut take: impl FnMut(usize, &Frame, Hit)) -> Result<(), Error> {
+    fn silent<const ANY: bool>(self, rays: &Rays<'_>, mut take: impl FnMut(usize, &Frame, Hit)) -> Result<(), Error> {
         self.with_room(|room| {
             if rays.len() >= LEAST_STREAM {
-                self.level.run(Streams { tracer: self, rays, any, take, room })
+                self.level.run(Streams::<_, ANY> { tracer: self, rays, take, room })
             } else {
                 let take = |index: usize, frame: &Frame, hit: Hit, _: Silent| take(index, frame, hit);
-                self.level.run(Singles { tracer: self, rays, any, take, room, probe: PhantomData })
+                self.level.run(Singles::<_, _, ANY> { tracer: self, rays, take, room, probe: PhantomData })
             }
         })
     }
@@ -111,20 +111,18 @@ fn in_ray_units(frame: &Frame, hit: Hit) -> Hit {
 }
 
 /// Rays that walk alone, and what to do with the index, frame, hit (in the frame's units) and probe of each.
-struct Singles<'a, F, P> {
+struct Singles<'a, F, P, const ANY: bool> {
     tracer: Tracer<'a>,
     rays: &'a Rays<'a>,
-    any: bool,
     take: F,
     room: &'a mut Room,
     probe: PhantomData<P>,
 }
 
 /// Rays that walk together, and what to do with the index, frame and hit (in the frame's units) of each.
-struct Streams<'a, F> {
+struct Streams<'a, F, const ANY: bool> {
     tracer: Tracer<'a>,
     rays: &'a Rays<'a>,
-    any: bool,
     take: F,
     room: &'a mut Room,
 }
@@ -132,16 +130,14 @@ struct Streams<'a, F> {
 /// The table that picks a loop's instance, once a batch.
 macro_rules! pick_instance {
     ($batch:ident, $simd:ident) => {
-        match ($batch.tracer.structure.grids.is_empty(), $batch.any) {
-            (true, false) => $batch.each::<S, false, false>($simd),
-            (true, true) => $batch.each::<S, false, true>($simd),
-            (false, false) => $batch.each::<S, true, false>($simd),
-            (false, true) => $batch.each::<S, true, true>($simd),
+        match $batch.tracer.structure.grids.is_empty() {
+            true => $batch.each::<S, false>($simd),
+            false => $batch.each::<S, true>($simd),
         }
     };
 }
 
-impl<F: FnMut(usize, &Frame, Hit, P), P: Probe + Default> Kernel for Singles<'_, F, P> {
+impl<F: FnMut(usize, &Frame, Hit, P), P: Probe + Default, const ANY: bool> Kernel for Singles<'_, F, P, ANY> {
     type Output = Result<(), Error>;
 
     #[inline(always)]
@@ -150,7 +146,7 @@ impl<F: FnMut(usize, &Frame, Hit, P), P: Probe + Default> Kernel for Singles<'_,
     }
 }
 
-impl<F: FnMut(usize, &Frame, Hit)> Kernel for Streams<'_, F> {
+impl<F: FnMut(usize, &Frame, Hit), const ANY: bool> Kernel for Streams<'_, F, ANY> {
     type Output = Result<(), Error>;
 
     #[inline(always)]
@@ -159,9 +155,9 @@ impl<F: FnMut(usize, &Frame, Hit)> Kernel for Streams<'_, F> {
     }
 }
 
-impl<F: FnMut(usize, &Frame, Hit, P), P: Probe + Default> Singles<'_, F, P> {
+impl<F: FnMut(usize, &Frame, Hit, P), P: Probe + Default, const ANY: bool> Singles<'_, F, P, ANY> {
     #[inline(always)]
-    fn each<S: Simd, const GRIDS: bool, const ANY: bool>(mut self, simd: S) -> Result<(), Error> {
+    fn each<S: Simd, const GRIDS: bool>(mut self, simd: S) -> Result<(), Error> {
         let Tracer { structure, mesh, .. } = self.tracer;
         for index in 0..self.rays.len() {
             let frame = self.rays.frame(index, &structure.domain)?;
@@ -174,9 +170,9 @@ impl<F: FnMut(usize, &Frame, Hit, P), P: Probe + Default> Singles<'_, F, P> {
     }
 }
 
-impl<F: FnMut(usize, &Frame, Hit)> Streams<'_, F> {
+impl<F: FnMut(usize, &Frame, Hit), const ANY: bool> Streams<'_, F, ANY> {
     #[inline(always)]
-    fn each<S: Simd, const GRIDS: bool, const ANY: bool>(mut self, simd: S) -> Result<(), Error> {
+    fn each<S: Simd, const GRIDS: bool>(mut self, simd: S) -> Result<(), Error> {
         self.room.bins.iter_mut().for_each(Bin::clear);
         let count = self.rays.len();
         for first in (0..count).step_by(LANES) {
@@ -191,18 +187,18 @@ impl<F: FnMut(usize, &Frame, Hit)> Streams<'_, F> {
                 let octant = frames[lane].octant();
                 self.room.bins[octant].push(first + lane, frames[lane]);
                 if self.room.bins[octant].is_full() {
-                    self.flush::<S, GRIDS, ANY>(simd, octant);
+                    self.flush::<S, GRIDS>(simd, octant);
                 }
             }
         }
         for octant in 0..8 {
-            self.flush::<S, GRIDS, ANY>(simd, octant);
+            self.flush::<S, GRIDS>(simd, octant);
         }
         Ok(())
     }
 
     #[inline(always)]
-    fn flush<S: Simd, const GRIDS: bool, const ANY: bool>(&mut self, simd: S, octant: usize) {
+    fn flush<S: Simd, const GRIDS: bool>(&mut self, simd: S, octant: usize) {
         let Tracer { structure, mesh, .. } = self.tracer;
         let Room { stack, bins, lists } = &mut *self.room;
         let bin = &mut bins[octant];

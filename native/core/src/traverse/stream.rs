@@ -94,13 +94,9 @@ pub fn trace<S: Simd, const GRIDS: bool, const ANY: bool>(
     while let Some(visit) = lists.visits.pop() {
         let ids = visit.start as usize..(visit.start + visit.count) as usize;
         match visit.node.target() {
-            _ if ids.len() < FEW => {
-                for &id in &lists.ids[ids] {
-                    let ray = Single { frame: &mut bin.frames[id as usize], best: &mut bin.hits[id as usize] };
-                    ray.trace::<S, GRIDS, ANY>(simd, structure, mesh, visit.node, stack);
-                }
+            Target::Branch(index) if ids.len() >= FEW => {
+                branch(simd, &nodes[index as usize], octant, ids, &bin.frames, lists);
             }
-            Target::Branch(index) => branch(simd, &nodes[index as usize], octant, ids, &bin.frames, lists),
             Target::Leaf { block, count } => {
                 let block = &blocks[block as usize];
                 for &id in &lists.ids[ids] {
@@ -108,7 +104,7 @@ pub fn trace<S: Simd, const GRIDS: bool, const ANY: bool>(
                     ray.block::<S, ANY>(simd, block, count);
                 }
             }
-            Target::Grid(_) | Target::Empty => {
+            Target::Branch(_) | Target::Grid(_) | Target::Empty => {
                 for &id in &lists.ids[ids] {
                     let ray = Single { frame: &mut bin.frames[id as usize], best: &mut bin.hits[id as usize] };
                     ray.trace::<S, GRIDS, ANY>(simd, structure, mesh, visit.node, stack);
