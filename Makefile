@@ -13,7 +13,7 @@ PORTABLE   := $(if $(filter Linux,$(shell uname)),--zig --compatibility manylinu
 VERSION    := $(shell sed -n 's/^version = "\(.*\)"/\1/p' blender_manifest.toml)
 ZIP        := dist/espalier-$(VERSION).zip
 
-.PHONY: help demo test check format bench bench-instructions bench-interfaces package clean
+.PHONY: help demo test test-aarch64 check format bench bench-instructions bench-interfaces package clean
 .DELETE_ON_ERROR:
 
 help: ## List these commands
@@ -26,6 +26,11 @@ test: .venv/ready $(ZIP) ## Run every test that needs no installed Blender
 	$(CARGO) test --workspace
 	$(BIN)/pytest tests/python
 	$(BIN)/pytest tests/headless
+
+test-aarch64: ## Run the core's tests compiled for aarch64, in an emulator: needs that target, its gcc and qemu-user
+	$(CARGO) test -p espalier-core --target aarch64-unknown-linux-gnu \
+	  --config 'target.aarch64-unknown-linux-gnu.linker = "aarch64-linux-gnu-gcc"' \
+	  --config 'target.aarch64-unknown-linux-gnu.runner = ["qemu-aarch64", "-L", "/usr/aarch64-linux-gnu"]'
 
 check: .venv/ready ## Check form, lints and types of Rust and Python
 	$(CARGO) fmt --all --check

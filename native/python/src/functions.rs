@@ -14,7 +14,7 @@ pub fn methods() -> Vec<&'static str> {
     Method::ALL.map(Method::name).to_vec()
 }
 
-/// The instruction set that queries use on this processor: "avx512", "avx2" or "portable".
+/// The instruction set that queries use on this processor: "avx512", "avx2", "neon" or "portable".
 #[pyfunction]
 pub fn instruction_set() -> &'static str {
     Level::detect().name()

@@ -2,7 +2,7 @@
 
 use std::arch::x86_64::*;
 
-use super::{GROUP, Kernel, Simd};
+use super::{GROUP, Kernel, Simd, shuffles::SHUFFLES};
 
 /// Proof that the processor has AVX2, FMA, BMI1, BMI2, LZCNT and POPCNT.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -201,27 +201,6 @@ impl Simd for Avx2 {
         }
         count
     }
-}
-
-/// For every set of eight, the byte shuffle that brings its 16-bit elements to the front.
-static SHUFFLES: [[u8; 16]; 256] = shuffles();
-
-const fn shuffles() -> [[u8; 16]; 256] {
-    let mut table = [[0x80; 16]; 256];
-    let mut set = 0;
-    while set < 256 {
-        let (mut from, mut to) = (0, 0);
-        while from < 8 {
-            if set >> from & 1 == 1 {
-                table[set][2 * to] = 2 * from as u8;
-                table[set][2 * to + 1] = 2 * from as u8 + 1;
-                to += 1;
-            }
-            from += 1;
-        }
-        set += 1;
-    }
-    table
 }
 
 impl Simd for Avx512 {
