@@ -1,6 +1,6 @@
 //! Axis-aligned bounding boxes.
 
-use glam::Vec3;
+use glam::{Vec3, Vec3A, Vec3Swizzles};
 
 /// A box from `lower` to `upper`; empty where lower exceeds upper.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -59,5 +59,45 @@ impl Bounds {
     /// The box grown by `margin` on every side.
     pub fn dilated(&self, margin: f32) -> Self {
         Self { lower: self.lower - Vec3::splat(margin), upper: self.upper + Vec3::splat(margin) }
+    }
+}
+
+/// [`Bounds`] in two aligned vectors, for builders that go through many: as [`Vec3A`] is to [`Vec3`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BoundsA {
+    /// Least corner.
+    pub lower: Vec3A,
+    /// Greatest corner.
+    pub upper: Vec3A,
+}
+
+impl BoundsA {
+    /// The box that contains nothing and is neutral under [`BoundsA::union`].
+    pub const EMPTY: Self = Self { lower: Vec3A::INFINITY, upper: Vec3A::NEG_INFINITY };
+
+    /// The smallest box around a triangle.
+    #[inline(always)]
+    pub fn of_corners(corners: [Vec3; 3]) -> Self {
+        let [a, b, c] = corners.map(Vec3A::from);
+        Self { lower: a.min(b).min(c), upper: a.max(b).max(c) }
+    }
+
+    /// The smallest box around both.
+    #[inline(always)]
+    pub fn union(&self, other: &Self) -> Self {
+        Self { lower: self.lower.min(other.lower), upper: self.upper.max(other.upper) }
+    }
+
+    /// Half the surface area of a box that is not empty.
+    #[inline(always)]
+    pub fn half_area(&self) -> f32 {
+        let e = self.upper - self.lower;
+        (e * e.yzx()).element_sum()
+    }
+}
+
+impl From<BoundsA> for Bounds {
+    fn from(bounds: BoundsA) -> Self {
+        Self { lower: bounds.lower.into(), upper: bounds.upper.into() }
     }
 }

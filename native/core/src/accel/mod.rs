@@ -1,11 +1,13 @@
 //! Accelerators: one structure of branches, leaves and grids, and the methods that decide which is where.
 
+pub mod bins;
 pub mod calibrate;
 pub mod cells;
 pub mod census;
 pub mod check;
 pub mod config;
 pub mod decision;
+pub mod draft;
 pub mod expected;
 pub mod grid;
 pub mod hybrid;
@@ -13,8 +15,11 @@ pub mod median;
 pub mod overlap;
 pub mod pack;
 pub mod places;
+pub mod planner;
+pub mod record;
 pub mod sah;
 pub mod sample;
+pub mod small;
 pub mod structure;
 pub mod subtree;
 pub mod tree;

@@ -2,9 +2,11 @@
 //! it knows neither.
 
 use bytemuck::{Pod, Zeroable};
+use glam::Vec3A;
 
 use crate::{
     arena::Arena,
+    bounds::BoundsA,
     traverse::frame::Domain,
     triangle::{Block, LANES},
 };
@@ -60,6 +62,16 @@ impl NodeRef {
         Self(2 << Self::TAG | index as u32)
     }
 
+    /// The same child where the nodes and blocks of its subtree stand so many places farther on.
+    #[inline(always)]
+    pub fn moved(self, nodes: usize, blocks: usize) -> Self {
+        match self.target() {
+            Target::Branch(index) => Self::branch(index as usize + nodes),
+            Target::Leaf { block, count } => Self::leaf(block as usize + blocks, count as usize),
+            Target::Grid(_) | Target::Empty => self,
+        }
+    }
+
     /// What it refers to.
     #[inline(always)]
     pub fn target(self) -> Target {
@@ -100,17 +112,33 @@ impl Node {
         order: [0; LANES],
     };
 
-    /// Set the order of visits from the boxes: by where their centres lie along the octant's diagonal.
+    /// A node with these children, whose boxes are in coordinates of the mesh; the boxes of [`NodeRef::EMPTY`] are
+    /// empty.
+    #[inline(always)]
+    pub fn new(child: [NodeRef; LANES], bounds: &[BoundsA; LANES], centre: Vec3A) -> Self {
+        let mut node = Self { child, ..Self::EMPTY };
+        for (lane, bounds) in bounds.iter().enumerate() {
+            let (lower, upper) = (bounds.lower - centre, bounds.upper - centre);
+            for k in 0..3 {
+                node.plane[k][lane] = lower[k];
+                node.plane[3 + k][lane] = upper[k];
+            }
+        }
+        node.set_order();
+        node
+    }
+
+    /// Set the order of visits from the boxes: by where their centres lie along the octant's diagonal. What comes
+    /// first in an octant comes last in the opposite one.
     pub fn set_order(&mut self) {
-        for octant in 0..8 {
-            let along = |lane: usize| -> f32 {
-                let centre = |k: usize| self.plane[k][lane] + self.plane[3 + k][lane];
-                (0..3).map(|k| if octant >> k & 1 == 1 { -centre(k) } else { centre(k) }).sum()
-            };
-            let mut lanes: [usize; LANES] = std::array::from_fn(|lane| lane);
-            let depth: [f32; LANES] = std::array::from_fn(along);
-            lanes.sort_by(|&a, &b| depth[a].total_cmp(&depth[b]));
-            self.order[octant] = lanes.iter().fold(0, |order, &lane| order << 3 | lane as u32);
+        let [x, y, z]: [[f32; LANES]; 3] =
+            std::array::from_fn(|k| std::array::from_fn(|lane| self.plane[k][lane] + self.plane[3 + k][lane]));
+        for octant in 0..4 {
+            let (sx, sy) = (sign(octant & 1), sign(octant >> 1));
+            let depth: [f32; LANES] = std::array::from_fn(|lane| sx * x[lane] + sy * y[lane] + z[lane]);
+            let forward = ranks(&depth);
+            self.order[octant] = in_order(&forward);
+            self.order[7 - octant] = in_order(&forward.map(|rank| LANES as u32 - 1 - rank));
         }
     }
 
@@ -123,6 +151,31 @@ impl Node {
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
+}
+
+fn sign(negative: usize) -> f32 {
+    if negative == 1 { -1.0 } else { 1.0 }
+}
+
+/// How many lanes come before each: those of less depth, and of equal depth those of lesser number. A lane whose depth
+/// is not a number comes after all that have one.
+#[inline(always)]
+fn ranks(depth: &[f32; LANES]) -> [u32; LANES] {
+    let depth = depth.map(|depth| if depth.is_nan() { f32::INFINITY } else { depth });
+    let mut ranks = [0; LANES];
+    for other in 0..LANES {
+        for lane in 0..LANES {
+            let tie = (depth[other] == depth[lane]) & (other < lane);
+            ranks[lane] += u32::from((depth[other] < depth[lane]) | tie);
+        }
+    }
+    ranks
+}
+
+/// A word of [`Node::order`].
+#[inline(always)]
+fn in_order(ranks: &[u32; LANES]) -> u32 {
+    ranks.iter().enumerate().fold(0, |order, (lane, rank)| order | (lane as u32) << (3 * (LANES as u32 - 1 - rank)))
 }
 
 /// A uniform grid over a box. Cell `(x, y, z)` has index `(z * resolution[1] + y) * resolution[0] + x`; its references
