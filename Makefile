@@ -13,11 +13,11 @@ PORTABLE   := $(if $(filter Linux,$(shell uname)),--zig --compatibility manylinu
 VERSION    := $(shell sed -n 's/^version = "\(.*\)"/\1/p' blender_manifest.toml)
 ZIP        := dist/espalier-$(VERSION).zip
 
-.PHONY: help demo test test-aarch64 check format bench bench-instructions bench-interfaces package clean
+.PHONY: help demo test test-aarch64 check format bench bench-instructions bench-interfaces bench-growth bench-threads package clean
 .DELETE_ON_ERROR:
 
 help: ## List these commands
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-18s %s\n", $$1, $$2 }' Makefile
+	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "make %-18s %s\n", $$1, $$2 }' Makefile
 
 demo: .venv/ready ## Trace a scene with every method and with Cycles: make demo [INPUT=file-or-scene-name]
 	$(BIN)/espalier compare "$(INPUT)" --resolution $(RESOLUTION) --cycles --out $(OUT)
@@ -52,6 +52,12 @@ bench-instructions: .venv/ready ## Count the instructions of fixed small cases w
 
 bench-interfaces: .venv/ready ## Measure what Python and Blender users call: embreex, BVHTree, scene.ray_cast [SCENES=...]
 	$(BIN)/python tests/bench/interfaces.py
+
+bench-growth: .venv/ready ## Measure build time and memory per triangle, 100 thousand to 20 million triangles [METHODS=...] [RECORD=1]
+	$(BIN)/python tests/bench/scaling.py growth
+
+bench-threads: .venv/ready ## Measure two threads against one, building and tracing [SCENES=...] [METHODS=...] [RECORD=1]
+	$(BIN)/python tests/bench/scaling.py threads
 
 package: $(ZIP) ## Make the extension's zip in dist/, as Blender installs it
 

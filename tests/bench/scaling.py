@@ -1,0 +1,154 @@
+"""`make bench-growth`, `make bench-threads`: how builds and traces scale with triangles and with threads.
+
+growth: build time and memory per triangle of a generated landscape of 100 thousand to 20 million triangles, and the
+greatest of each over the least. threads: one thread against two, in turns, over the benchmarks' scenes of more than
+50,000 triangles. METHODS, SCENES (threads only) and MOST (triangles, growth only) come from the environment. Write
+out/growth.json and out/threads.json; with RECORD=1 they are kept in tests/bench/record.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import definitions
+import espalier_rt
+import harness
+import numpy as np
+import record
+from numpy.typing import NDArray
+
+from espalier_scenes import geometry
+
+Row = dict[str, Any]
+
+METHODS = ("lbvh", "bvh-clusters", "bvh-sah", "hybrid")
+TRIANGLES = (100_000, 300_000, 1_000_000, 3_000_000, 10_000_000, 20_000_000)
+"""Sizes of the landscapes."""
+ROUNDS_OF = 6_000_000
+"""Rounds are as many as this many triangles allow, from 1 to 9; the least time counts."""
+FEWEST = 50_000
+"""Scenes with fewer triangles are not worth a second thread."""
+
+
+def main() -> int:
+    """Measure what the command line names; print, write, keep."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("subject", choices=["growth", "threads"])
+    subject = parser.parse_args().subject
+    methods = os.environ.get("METHODS", "").split() or METHODS
+    rows = growth(methods) if subject == "growth" else threads(methods)
+    about = record.header(argparse.Namespace(isa=None, threads="1, 2" if subject == "threads" else 1))
+    text = json.dumps({"about": about, "rows": rows}, indent=1) + "\n"
+    Path("out").mkdir(exist_ok=True)
+    Path(f"out/{subject}.json").write_text(text, encoding="utf-8")
+    if os.environ.get("RECORD") == "1":
+        (record.FOLDER / f"{subject}.json").write_text(text, encoding="utf-8")
+    return 0
+
+
+def growth(methods: list[str] | tuple[str, ...]) -> list[Row]:
+    """Nanoseconds and bytes per triangle, by method and size."""
+    harness.pin(1)
+    rows: list[Row] = []
+    most = int(os.environ.get("MOST") or TRIANGLES[-1])
+    for size in (size for size in TRIANGLES if size <= most):
+        vertices, triangles = landscape(size)
+        mesh, count = espalier_rt.Mesh(vertices, triangles), len(triangles)
+        for method in methods:
+            rounds = max(1, min(9, ROUNDS_OF // size))
+            took, accelerator = best(rounds, lambda: espalier_rt.Accelerator.build(mesh, method, threads=1))  # noqa: B023
+            census = accelerator.census()
+            row = {"method": method, "triangles": count}
+            row |= {"build_ns": took / count * 1e9, "bytes": census["bytes"] / count}
+            rows.append(row)
+            print(f"{method:<14} {count:>12,} triangles {row['build_ns']:8.1f} ns {row['bytes']:7.1f} bytes each")
+            del accelerator
+    for method in methods:
+        print(
+            f"{method:<14} " + ", ".join(f"{what} x{spread(rows, method, what):.2f}" for what in ("build_ns", "bytes"))
+        )
+    return rows
+
+
+def landscape(triangles: int) -> geometry.Mesh:
+    """Hills of about so many triangles, of as many waves whatever their number."""
+
+    def height(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+        return 0.1 * np.sin(9 * x) * np.cos(7 * y) + 0.02 * np.sin(61 * x + 3 * y) + 0.01 * np.cos(97 * y - 5 * x)
+
+    return geometry.plane(1.0, round((triangles / 2) ** 0.5), height)
+
+
+def spread(rows: list[Row], method: str, what: str) -> float:
+    """The greatest over the least of a column of a method."""
+    values = [row[what] for row in rows if row["method"] == method]
+    return max(values) / min(values)
+
+
+def threads(methods: list[str] | tuple[str, ...]) -> list[Row]:
+    """Seconds of building and of tracing a million primary rays on one thread and on two, and their ratios."""
+    defined = definitions.load()
+    names = os.environ.get("SCENES", "").split()
+    binary = harness.build()
+    rows: list[Row] = []
+    for scene in defined.choose_scenes(names):
+        vertices, triangles = scene.mesh()
+        if len(triangles) < FEWEST:
+            continue
+        mesh, rays = espalier_rt.Mesh(vertices, triangles), primary_rays(defined, scene, binary)
+        for method in methods:
+            row = {"scene": scene.name, "method": method, "triangles": len(triangles)} | both(mesh, method, *rays)
+            rows.append(row)
+            print(f"{scene.name:<20} {method:<14} build x{row['build']:.2f} trace x{row['trace']:.2f}", flush=True)
+    return rows
+
+
+def primary_rays(defined: definitions.Definitions, scene: definitions.Scene, binary: Path) -> list[NDArray[np.float32]]:
+    """(n, 3) origins and directions of the benchmarks' primary rays."""
+    directory = Path("out/bench")
+    classes = [entry | {"methods": ["lbvh"]} for entry in defined.choose_classes(["primary"])]
+    plan, file = defined.plan(scene, classes, directory, rounds=1), directory / f"{scene.name}.rays"
+    list(harness.run(binary, "rays", plan, directory / f"{scene.name}.json", "primary", file))
+    columns = np.fromfile(file, "<f4").reshape(8, -1)
+    return [columns[:3].T, columns[3:6].T]
+
+
+def both(
+    mesh: espalier_rt.Mesh, method: str, origins: NDArray[np.float32], directions: NDArray[np.float32]
+) -> dict[str, float]:
+    """Least times on the clock on one thread and on two, in turns, over seven rounds, and their ratios."""
+    times: dict[str, float] = {}
+    for _ in range(7):
+        for count in (1, 2):
+            took, accelerator = best(1, lambda: espalier_rt.Accelerator.build(mesh, method, threads=count))  # noqa: B023
+            _least(times, f"build_s_{count}", took)
+            took, _ = best(1, lambda: accelerator.closest(origins, directions, threads=count))  # noqa: B023
+            _least(times, f"trace_s_{count}", took)
+    ratios = {what: times[f"{what}_s_1"] / times[f"{what}_s_2"] for what in ("build", "trace")}
+    return times | ratios
+
+
+def _least(times: dict[str, float], name: str, took: float) -> None:
+    times[name] = min(took, times.get(name, took))
+
+
+def best(rounds: int, work: Callable[[], Any]) -> tuple[float, Any]:
+    """The least seconds on the clock that some work took, and what it gave at last."""
+    least, result = float("inf"), None
+    for _ in range(rounds):
+        result = None
+        start = time.perf_counter()
+        result = work()
+        least = min(least, time.perf_counter() - start)
+    return least, result
+
+
+if __name__ == "__main__":
+    sys.exit(main())
