@@ -26,6 +26,8 @@ pub use x86::{Avx2, Avx512};
 pub trait Simd: Copy + Send + Sync + 'static {
     /// Eight numbers.
     type F32: Copy;
+    /// Eight numbers in double precision.
+    type F64: Copy;
 
     /// Compile `kernel` for this instruction set and run it.
     fn run<K: Kernel>(self, kernel: K) -> K::Output;
@@ -63,6 +65,22 @@ pub trait Simd: Copy + Send + Sync + 'static {
     fn le(self, a: Self::F32, b: Self::F32) -> u32;
     /// Bit `i` is set where lane `i` has a < 0 < b.
     fn straddles_zero(self, a: Self::F32, b: Self::F32) -> u32;
+    /// The same numbers in double precision.
+    fn widen(self, value: Self::F32) -> Self::F64;
+    /// The nearest numbers in single precision, ties to even, as `as f32` rounds.
+    fn narrow(self, value: Self::F64) -> Self::F32;
+    /// a + b, rounded once
+    fn add_f64(self, a: Self::F64, b: Self::F64) -> Self::F64;
+    /// a - b, rounded once
+    fn sub_f64(self, a: Self::F64, b: Self::F64) -> Self::F64;
+    /// a * b, rounded once
+    fn mul_f64(self, a: Self::F64, b: Self::F64) -> Self::F64;
+    /// a / b, rounded once
+    fn div_f64(self, a: Self::F64, b: Self::F64) -> Self::F64;
+    /// Bit `i` is set where lane `i` is above zero.
+    fn positive_f64(self, value: Self::F64) -> u32;
+    /// Bit `i` is set where lane `i` is below zero.
+    fn negative_f64(self, value: Self::F64) -> u32;
     /// Copy the ids whose mask has bit `bit` to the front of `out`, in order, and count them.
     ///
     /// All slices have the same length, a multiple of [`GROUP`]; what stands in `out` behind the copies is unspecified.

@@ -23,6 +23,9 @@ fn enter_neon<K: Kernel>(token: Neon, kernel: K) -> K::Output {
 /// Lanes 0 to 3, then 4 to 7.
 type Pair = [float32x4_t; 2];
 
+/// Lanes 0 and 1, then 2 and 3, and so on.
+type Quad = [float64x2_t; 4];
+
 /// Both halves by the same operation, in which every named pair stands for its half.
 macro_rules! halves {
     ($($pair:ident),+ => $operation:expr) => {
@@ -41,6 +44,28 @@ macro_rules! halves {
     };
 }
 
+/// All quarters by the same operation.
+macro_rules! quarters {
+    ($a:ident, $b:ident => $operation:ident) => {
+        // SAFETY: a token exists only where NEON was detected.
+        unsafe {
+            [$operation($a[0], $b[0]), $operation($a[1], $b[1]), $operation($a[2], $b[2]), $operation($a[3], $b[3])]
+        }
+    };
+}
+
+/// The quarters of comparisons as bits.
+#[inline(always)]
+fn quarter_bits(_: Neon, set: [uint64x2_t; 4]) -> u32 {
+    let mut bits = 0;
+    for (quarter, set) in set.into_iter().enumerate() {
+        // SAFETY: the token exists only where NEON was detected.
+        let (low, high) = unsafe { (vgetq_lane_u64::<0>(set), vgetq_lane_u64::<1>(set)) };
+        bits |= (low as u32 & 1 | high as u32 & 2) << (2 * quarter);
+    }
+    bits
+}
+
 /// The halves of comparisons as bits.
 #[inline(always)]
 fn bits(_: Neon, [low, high]: [uint32x4_t; 2]) -> u32 {
@@ -54,6 +79,7 @@ fn bits(_: Neon, [low, high]: [uint32x4_t; 2]) -> u32 {
 
 impl Simd for Neon {
     type F32 = Pair;
+    type F64 = Quad;
 
     #[inline]
     fn run<K: Kernel>(self, kernel: K) -> K::Output {
@@ -137,6 +163,46 @@ impl Simd for Neon {
     #[inline(always)]
     fn straddles_zero(self, a: Pair, b: Pair) -> u32 {
         bits(self, halves!(a, b => vandq_u32(vcltzq_f32(a), vcgtzq_f32(b))))
+    }
+    #[inline(always)]
+    fn widen(self, [a, b]: Pair) -> Quad {
+        // SAFETY: as for `splat`.
+        unsafe {
+            [vcvt_f64_f32(vget_low_f32(a)), vcvt_high_f64_f32(a), vcvt_f64_f32(vget_low_f32(b)), vcvt_high_f64_f32(b)]
+        }
+    }
+    #[inline(always)]
+    fn narrow(self, [a, b, c, d]: Quad) -> Pair {
+        // SAFETY: as for `splat`.
+        unsafe { [vcvt_high_f32_f64(vcvt_f32_f64(a), b), vcvt_high_f32_f64(vcvt_f32_f64(c), d)] }
+    }
+    #[inline(always)]
+    fn add_f64(self, a: Quad, b: Quad) -> Quad {
+        quarters!(a, b => vaddq_f64)
+    }
+    #[inline(always)]
+    fn sub_f64(self, a: Quad, b: Quad) -> Quad {
+        quarters!(a, b => vsubq_f64)
+    }
+    #[inline(always)]
+    fn mul_f64(self, a: Quad, b: Quad) -> Quad {
+        quarters!(a, b => vmulq_f64)
+    }
+    #[inline(always)]
+    fn div_f64(self, a: Quad, b: Quad) -> Quad {
+        quarters!(a, b => vdivq_f64)
+    }
+    #[inline(always)]
+    fn positive_f64(self, value: Quad) -> u32 {
+        // SAFETY: as for `splat`.
+        let set = unsafe { [vcgtzq_f64(value[0]), vcgtzq_f64(value[1]), vcgtzq_f64(value[2]), vcgtzq_f64(value[3])] };
+        quarter_bits(self, set)
+    }
+    #[inline(always)]
+    fn negative_f64(self, value: Quad) -> u32 {
+        // SAFETY: as for `splat`.
+        let set = unsafe { [vcltzq_f64(value[0]), vcltzq_f64(value[1]), vcltzq_f64(value[2]), vcltzq_f64(value[3])] };
+        quarter_bits(self, set)
     }
     #[inline(always)]
     fn compact(self, masks: &[u8], bit: u32, ids: &[u16], out: &mut [u16]) -> usize {

@@ -7,7 +7,7 @@ use super::{Kernel, Simd};
 pub struct Portable;
 
 #[inline(always)]
-fn zip(a: [f32; 8], b: [f32; 8], f: impl Fn(f32, f32) -> f32) -> [f32; 8] {
+fn zip<T: Copy>(a: [T; 8], b: [T; 8], f: impl Fn(T, T) -> T) -> [T; 8] {
     std::array::from_fn(|i| f(a[i], b[i]))
 }
 
@@ -18,6 +18,7 @@ fn bits(f: impl Fn(usize) -> bool) -> u32 {
 
 impl Simd for Portable {
     type F32 = [f32; 8];
+    type F64 = [f64; 8];
 
     #[inline]
     fn run<K: Kernel>(self, kernel: K) -> K::Output {
@@ -90,6 +91,38 @@ impl Simd for Portable {
     #[inline(always)]
     fn straddles_zero(self, a: [f32; 8], b: [f32; 8]) -> u32 {
         bits(|i| (a[i] < 0.0) & (b[i] > 0.0))
+    }
+    #[inline(always)]
+    fn widen(self, value: [f32; 8]) -> [f64; 8] {
+        value.map(f64::from)
+    }
+    #[inline(always)]
+    fn narrow(self, value: [f64; 8]) -> [f32; 8] {
+        value.map(|value| value as f32)
+    }
+    #[inline(always)]
+    fn add_f64(self, a: [f64; 8], b: [f64; 8]) -> [f64; 8] {
+        zip(a, b, |a, b| a + b)
+    }
+    #[inline(always)]
+    fn sub_f64(self, a: [f64; 8], b: [f64; 8]) -> [f64; 8] {
+        zip(a, b, |a, b| a - b)
+    }
+    #[inline(always)]
+    fn mul_f64(self, a: [f64; 8], b: [f64; 8]) -> [f64; 8] {
+        zip(a, b, |a, b| a * b)
+    }
+    #[inline(always)]
+    fn div_f64(self, a: [f64; 8], b: [f64; 8]) -> [f64; 8] {
+        zip(a, b, |a, b| a / b)
+    }
+    #[inline(always)]
+    fn positive_f64(self, value: [f64; 8]) -> u32 {
+        bits(|i| value[i] > 0.0)
+    }
+    #[inline(always)]
+    fn negative_f64(self, value: [f64; 8]) -> u32 {
+        bits(|i| value[i] < 0.0)
     }
     #[inline(always)]
     fn compact(self, masks: &[u8], bit: u32, ids: &[u16], out: &mut [u16]) -> usize {

@@ -155,11 +155,65 @@ macro_rules! arithmetic {
             // SAFETY: as for `splat`.
             unsafe { _mm256_max_ps(a, b) }
         }
+        #[inline(always)]
+        fn widen(self, value: __m256) -> [__m256d; 2] {
+            // SAFETY: as for `splat`.
+            unsafe {
+                let high = _mm256_extractf128_ps::<1>(value);
+                [_mm256_cvtps_pd(_mm256_castps256_ps128(value)), _mm256_cvtps_pd(high)]
+            }
+        }
+        #[inline(always)]
+        fn narrow(self, value: [__m256d; 2]) -> __m256 {
+            // SAFETY: as for `splat`.
+            unsafe { _mm256_set_m128(_mm256_cvtpd_ps(value[1]), _mm256_cvtpd_ps(value[0])) }
+        }
+        #[inline(always)]
+        fn add_f64(self, a: [__m256d; 2], b: [__m256d; 2]) -> [__m256d; 2] {
+            // SAFETY: as for `splat`.
+            unsafe { [_mm256_add_pd(a[0], b[0]), _mm256_add_pd(a[1], b[1])] }
+        }
+        #[inline(always)]
+        fn sub_f64(self, a: [__m256d; 2], b: [__m256d; 2]) -> [__m256d; 2] {
+            // SAFETY: as for `splat`.
+            unsafe { [_mm256_sub_pd(a[0], b[0]), _mm256_sub_pd(a[1], b[1])] }
+        }
+        #[inline(always)]
+        fn mul_f64(self, a: [__m256d; 2], b: [__m256d; 2]) -> [__m256d; 2] {
+            // SAFETY: as for `splat`.
+            unsafe { [_mm256_mul_pd(a[0], b[0]), _mm256_mul_pd(a[1], b[1])] }
+        }
+        #[inline(always)]
+        fn div_f64(self, a: [__m256d; 2], b: [__m256d; 2]) -> [__m256d; 2] {
+            // SAFETY: as for `splat`.
+            unsafe { [_mm256_div_pd(a[0], b[0]), _mm256_div_pd(a[1], b[1])] }
+        }
+        #[inline(always)]
+        fn positive_f64(self, value: [__m256d; 2]) -> u32 {
+            // SAFETY: as for `splat`.
+            unsafe {
+                let zero = _mm256_setzero_pd();
+                let low = _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_GT_OQ>(value[0], zero));
+                let high = _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_GT_OQ>(value[1], zero));
+                low as u32 | (high as u32) << 4
+            }
+        }
+        #[inline(always)]
+        fn negative_f64(self, value: [__m256d; 2]) -> u32 {
+            // SAFETY: as for `splat`.
+            unsafe {
+                let zero = _mm256_setzero_pd();
+                let low = _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(value[0], zero));
+                let high = _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(value[1], zero));
+                low as u32 | (high as u32) << 4
+            }
+        }
     };
 }
 
 impl Simd for Avx2 {
     type F32 = __m256;
+    type F64 = [__m256d; 2];
 
     #[inline]
     fn run<K: Kernel>(self, kernel: K) -> K::Output {
@@ -205,6 +259,7 @@ impl Simd for Avx2 {
 
 impl Simd for Avx512 {
     type F32 = __m256;
+    type F64 = [__m256d; 2];
 
     #[inline]
     fn run<K: Kernel>(self, kernel: K) -> K::Output {

@@ -2,6 +2,8 @@
 
 mod batch;
 mod dda;
+#[allow(dead_code)] // Until the traversers that come next call it.
+mod exact;
 pub mod frame;
 mod kernel;
 mod leaf;
