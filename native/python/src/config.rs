@@ -1,6 +1,9 @@
 //! Settings of builders to and from Python.
 
-use espalier_core::{Config, Method};
+use espalier_core::{
+    Config, Method,
+    accel::method::{Hierarchy, Judgement, Recipe},
+};
 use pyo3::{
     prelude::*,
     types::{PyBool, PyDict, PyMapping},
@@ -30,14 +33,14 @@ enum Readers {
 
 impl Readers {
     fn include(self, method: Method) -> bool {
-        let hybrid = matches!(method, Method::HybridSampled | Method::HybridCost);
+        let recipe = method.recipe();
         match self {
             Self::All => true,
-            Self::Sah => method == Method::BvhSah,
-            Self::Grids => hybrid || method == Method::Grid,
-            Self::Hybrids => hybrid,
-            Self::Sampled => method == Method::HybridSampled,
-            Self::Cost => method == Method::HybridCost,
+            Self::Sah => recipe == Recipe::Hierarchy(Hierarchy::Sah),
+            Self::Grids => matches!(recipe, Recipe::Grid | Recipe::Hybrid(_)),
+            Self::Hybrids => matches!(recipe, Recipe::Hybrid(_)),
+            Self::Sampled => recipe == Recipe::Hybrid(Judgement::Sampled),
+            Self::Cost => recipe == Recipe::Hybrid(Judgement::ExpectedCost),
         }
     }
 }
@@ -58,7 +61,7 @@ macro_rules! real {
 }
 
 /// Every setting, by name.
-const FIELDS: [(&str, Readers, Field); 19] = [
+const FIELDS: &[(&str, Readers, Field)] = &[
     ("seed", Readers::All, whole!(seed)),
     ("expected_rays", Readers::All, real!(expected_rays)),
     ("leaf_size", Readers::All, whole!(leaf_size)),
@@ -81,7 +84,7 @@ const FIELDS: [(&str, Readers, Field); 19] = [
 ];
 
 fn fields(method: Method) -> impl Iterator<Item = &'static (&'static str, Readers, Field)> {
-    const { &FIELDS }.iter().filter(move |(_, readers, _)| readers.include(method))
+    FIELDS.iter().filter(move |(_, readers, _)| readers.include(method))
 }
 
 /// The settings that `method` knows.
@@ -99,7 +102,7 @@ pub fn to_dict<'py>(py: Python<'py>, method: Method, config: &Config) -> PyResul
 /// The settings that say what a traversal costs.
 pub fn costs<'py>(py: Python<'py>, config: &Config) -> PyResult<Bound<'py, PyDict>> {
     let dict = PyDict::new(py);
-    for (name, _, field) in const { &FIELDS }.iter().filter(|(name, _, _)| name.ends_with("_ns")) {
+    for (name, _, field) in FIELDS.iter().filter(|(name, _, _)| name.ends_with("_ns")) {
         if let Field::Real(get, _) = field {
             dict.set_item(name, get(config))?;
         }

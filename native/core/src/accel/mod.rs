@@ -12,6 +12,7 @@ pub mod expected;
 pub mod grid;
 pub mod hybrid;
 pub mod median;
+pub mod method;
 pub mod overlap;
 pub mod pack;
 pub mod places;
@@ -26,12 +27,14 @@ pub mod tree;
 
 use std::{sync::Arc, time::Instant};
 
+pub use self::method::Method;
 use self::{
     cells::{CellFilter, Cells},
     census::Census,
     config::Config,
     decision::Decision,
     grid::BuiltGrid,
+    method::{Hierarchy, Judgement, Recipe},
     structure::Structure,
     tree::{Kind, Tree, TreeNode},
 };
@@ -43,56 +46,6 @@ use crate::{
     simd::Level,
     traverse::{Tracer, frame::Domain, probe::Counts},
 };
-
-/// How a tree is decided on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Method {
-    /// Median splits along cycling axes: the paper's benchmark.
-    BvhMedian,
-    /// Binned surface area heuristic.
-    BvhSah,
-    /// One uniform grid.
-    Grid,
-    /// The paper's hybrid: sampled rays decide which nodes become grids.
-    HybridSampled,
-    /// The same tree and samples, decided by expected cost.
-    HybridCost,
-}
-
-impl Method {
-    /// All of them.
-    pub const ALL: [Self; 5] = [Self::BvhMedian, Self::BvhSah, Self::Grid, Self::HybridSampled, Self::HybridCost];
-
-    /// Its name, as users write it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::BvhMedian => "bvh-median",
-            Self::BvhSah => "bvh-sah",
-            Self::Grid => "grid",
-            Self::HybridSampled => "hybrid-sampled",
-            Self::HybridCost => "hybrid-cost",
-        }
-    }
-
-    /// How often a build goes through all triangles: to divide them, to judge them, to pack them.
-    fn passes(self) -> u64 {
-        match self {
-            Self::BvhMedian | Self::BvhSah | Self::Grid => 2,
-            Self::HybridSampled | Self::HybridCost => 3,
-        }
-    }
-
-    /// The method of that name.
-    ///
-    /// # Errors
-    /// [`Error::Config`] lists the names there are.
-    pub fn from_name(name: &str) -> Result<Self, Error> {
-        Self::ALL.into_iter().find(|method| method.name() == name).ok_or_else(|| {
-            let names = Self::ALL.map(Self::name).join(", ");
-            Error::Config(format!("there is no method '{name}'; choose one of: {names}"))
-        })
-    }
-}
 
 /// Milliseconds of one phase of a build.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -123,7 +76,7 @@ impl Accelerator {
         config.check()?;
         job.begin(Phase::Build, method.passes() * mesh.solid().len() as u64);
         let mut builder = Builder { mesh: &mesh, config, job, phases: Vec::new(), decisions: Vec::new() };
-        let structure = pool::install(threads, || builder.structure(method))??;
+        let structure = pool::install(threads, || builder.structure(method.recipe()))??;
         let Builder { phases, decisions, .. } = builder;
         Ok(Self { mesh, method, structure, phases, decisions, level: Level::detect() })
     }
@@ -210,24 +163,30 @@ struct Builder<'a> {
 }
 
 impl Builder<'_> {
-    fn structure(&mut self, method: Method) -> Result<Structure, Error> {
-        let tree = match method {
-            Method::BvhSah => self.hierarchy(&sah::BinnedSah { bins: self.config.sah_bins, job: self.job })?,
-            Method::Grid => self.single_grid()?,
-            Method::BvhMedian => self.hierarchy(&median::CyclingMedian { job: self.job })?,
-            Method::HybridSampled => self.hybrid(&hybrid::Sampled)?,
-            Method::HybridCost => self.hybrid(&expected::ExpectedCost)?,
+    fn structure(&mut self, recipe: Recipe) -> Result<Structure, Error> {
+        let tree = match recipe {
+            Recipe::Hierarchy(hierarchy) => self.hierarchy(hierarchy)?,
+            Recipe::Grid => self.single_grid()?,
+            Recipe::Hybrid(Judgement::Sampled) => self.hybrid(&hybrid::Sampled)?,
+            Recipe::Hybrid(Judgement::ExpectedCost) => self.hybrid(&expected::ExpectedCost)?,
         };
         self.timed("pack", |this| pack::pack(&tree, this.mesh, this.job))
     }
 
-    fn hierarchy(&mut self, split: &impl tree::Split) -> Result<Tree, Error> {
+    fn hierarchy(&mut self, hierarchy: Hierarchy) -> Result<Tree, Error> {
+        match hierarchy {
+            Hierarchy::Median => self.divided(&median::CyclingMedian { job: self.job }),
+            Hierarchy::Sah => self.divided(&sah::BinnedSah { bins: self.config.sah_bins, job: self.job }),
+        }
+    }
+
+    fn divided(&mut self, split: &impl tree::Split) -> Result<Tree, Error> {
         let items = self.timed("bounds", |this| tree::items(this.mesh))?;
         self.timed("split", |this| tree::build(items, this.config.leaf_size, split, this.job))
     }
 
     fn hybrid(&mut self, judge: &impl hybrid::Judge) -> Result<Tree, Error> {
-        let tree = self.hierarchy(&median::CyclingMedian { job: self.job })?;
+        let tree = self.hierarchy(Hierarchy::Median)?;
         let (tree, decisions) =
             self.timed("verdicts", |this| hybrid::decide(tree, this.mesh, this.config, judge, this.job))?;
         self.decisions = decisions;

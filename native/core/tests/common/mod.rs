@@ -200,18 +200,20 @@ pub fn eager() -> Config {
     }
 }
 
-/// Run a test on the named variant of a method and instruction set, if this processor has it.
-pub fn run(variant: &str, level: &str, test: impl Fn(&Walk)) {
-    let (method, config) = match variant {
-        "bvh_median" => (Method::BvhMedian, Config::default()),
-        "bvh_sah" => (Method::BvhSah, Config::default()),
-        "grid" => (Method::Grid, Config::default()),
-        "hybrid_sampled" => (Method::HybridSampled, Config::default()),
-        "hybrid_cost" => (Method::HybridCost, Config::default()),
-        "eager_sampled" => (Method::HybridSampled, eager()),
-        "eager_cost" => (Method::HybridCost, eager()),
-        _ => panic!("no variant {variant}"),
+/// A variant's method and settings. Its name is the method's with underscores; those of hybrids have a second one,
+/// `eager_` instead of `hybrid_`.
+pub fn variant(name: &str) -> (Method, Config) {
+    let (wanted, config) = match name.strip_prefix("eager_") {
+        Some(judge) => (format!("hybrid_{judge}"), eager()),
+        None => (name.to_owned(), Config::default()),
     };
+    let method = Method::ALL.into_iter().find(|method| method.name().replace(['-', '+'], "_") == wanted);
+    (method.unwrap_or_else(|| panic!("no variant {name}")), config)
+}
+
+/// Run a test on the named variant of a method and instruction set, if this processor has it.
+pub fn run(name: &str, level: &str, test: impl Fn(&Walk)) {
+    let (method, config) = variant(name);
     match Level::available().into_iter().find(|available| available.name() == level) {
         Some(level) => test(&Walk { method, config, level }),
         None => eprintln!("skipped: this processor has no {level}"),
@@ -226,6 +228,11 @@ macro_rules! every_walk {
             bvh_median, bvh_sah, grid, hybrid_sampled, hybrid_cost, eager_sampled, eager_cost);
     };
     (@variants $tests:tt; $($variant:ident),+) => {
+        #[test]
+        fn no_method_is_left_out() {
+            let walked = [$($crate::common::variant(stringify!($variant)).0),+];
+            assert!(espalier_core::Method::ALL.iter().all(|method| walked.contains(method)));
+        }
         $(mod $variant { $crate::every_walk!(@levels $variant $tests; portable, avx2, avx512, neon); })+
     };
     (@levels $variant:ident $tests:tt; $($level:ident),+) => {

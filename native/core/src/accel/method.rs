@@ -1,0 +1,117 @@
+//! The methods: what each is called and what it builds, in one table.
+
+use crate::Error;
+
+/// How a structure is decided on: a row of [`ROWS`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Method {
+    /// Median splits along cycling axes: the paper's benchmark.
+    BvhMedian,
+    /// Binned surface area heuristic.
+    BvhSah,
+    /// One uniform grid.
+    Grid,
+    /// The paper's hybrid: sampled rays decide which nodes become grids.
+    HybridSampled,
+    /// The same tree and samples, decided by expected cost.
+    HybridCost,
+}
+
+/// Which binary tree a hierarchy starts from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Hierarchy {
+    /// [`median`](super::median)
+    Median,
+    /// [`sah`](super::sah)
+    Sah,
+}
+
+/// Who decides which nodes of a median tree become grids.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Judgement {
+    /// [`hybrid::Sampled`](super::hybrid::Sampled)
+    Sampled,
+    /// [`expected::ExpectedCost`](super::expected::ExpectedCost)
+    ExpectedCost,
+}
+
+/// What a method builds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Recipe {
+    /// A binary tree, packed.
+    Hierarchy(Hierarchy),
+    /// One grid over everything.
+    Grid,
+    /// A median tree, some of whose nodes become grids.
+    Hybrid(Judgement),
+}
+
+/// All that there is to know about a method.
+#[derive(Debug, Clone, Copy)]
+struct Row {
+    method: Method,
+    /// As users write it.
+    name: &'static str,
+    recipe: Recipe,
+    /// How often a build goes through all triangles: to divide them, to judge or improve, to pack them.
+    passes: u64,
+}
+
+/// A method with its name, its recipe and its passes. Adding one takes a variant, a row, and its name in the tests'
+/// list of walks.
+#[rustfmt::skip]
+const ROWS: &[Row] = &[
+    row(Method::BvhMedian, "bvh-median", Recipe::Hierarchy(Hierarchy::Median), 2),
+    row(Method::BvhSah, "bvh-sah", Recipe::Hierarchy(Hierarchy::Sah), 2),
+    row(Method::Grid, "grid", Recipe::Grid, 2),
+    row(Method::HybridSampled, "hybrid-sampled", Recipe::Hybrid(Judgement::Sampled), 3),
+    row(Method::HybridCost, "hybrid-cost", Recipe::Hybrid(Judgement::ExpectedCost), 3),
+];
+
+const fn row(method: Method, name: &'static str, recipe: Recipe, passes: u64) -> Row {
+    Row { method, name, recipe, passes }
+}
+
+impl Method {
+    /// All of them, in the order of their table.
+    pub const ALL: [Self; ROWS.len()] = {
+        let mut all = [Self::BvhMedian; ROWS.len()];
+        let mut index = 0;
+        while index < ROWS.len() {
+            assert!(ROWS[index].method as usize == index, "variants and rows stand in the same order");
+            all[index] = ROWS[index].method;
+            index += 1;
+        }
+        all
+    };
+
+    fn row(self) -> &'static Row {
+        &ROWS[self as usize]
+    }
+
+    /// Its name, as users write it.
+    pub fn name(self) -> &'static str {
+        self.row().name
+    }
+
+    /// What it builds.
+    pub fn recipe(self) -> Recipe {
+        self.row().recipe
+    }
+
+    /// How often a build goes through all triangles.
+    pub(super) fn passes(self) -> u64 {
+        self.row().passes
+    }
+
+    /// The method of that name.
+    ///
+    /// # Errors
+    /// [`Error::Config`] lists the names there are.
+    pub fn from_name(name: &str) -> Result<Self, Error> {
+        Self::ALL.into_iter().find(|method| method.name() == name).ok_or_else(|| {
+            let names = Self::ALL.map(Self::name).join(", ");
+            Error::Config(format!("there is no method '{name}'; choose one of: {names}"))
+        })
+    }
+}
