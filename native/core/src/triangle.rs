@@ -51,16 +51,15 @@ impl Block {
         self.corner.map(|corner| corner.map(|axis| axis[lane]))
     }
 
-    /// The exact test of one lane.
-    #[inline(always)]
+    /// The exact test of one lane. Few tests are left to it.
+    #[cold]
+    #[inline(never)]
     pub fn intersect(&self, lane: usize, frame: &Frame) -> Option<Hit> {
         intersect(frame, self.corners(lane), self.primitive[lane])
     }
 }
 
 /// Where a ray meets a triangle, in the frame's units, if it does so within the frame's interval.
-///
-/// The parameter and the weights are evaluated in double precision and rounded once.
 #[inline(always)]
 pub fn intersect(frame: &Frame, corners: [[f32; 3]; 3], primitive: u32) -> Option<Hit> {
     let [a, b, c] = corners.map(|corner| shear(frame, corner));
@@ -69,14 +68,27 @@ pub fn intersect(frame: &Frame, corners: [[f32; 3]; 3], primitive: u32) -> Optio
     if inside != sign(v, c, a) || inside != sign(w, a, b) {
         return None;
     }
-    let determinant = u + v + w;
-    if determinant == 0.0 {
+    if u + v + w == 0.0 {
         return None;
     }
+    let hit = weigh(frame, [u, v, w], [a[2], b[2], c[2]], primitive);
+    (frame.tmin <= hit.t && hit.t <= frame.tmax).then_some(hit)
+}
+
+/// Where a ray meets a triangle that it is known to meet, in the frame's units: what [`intersect`] says, to the bit.
+#[inline(always)]
+pub fn evaluate(frame: &Frame, corners: [[f32; 3]; 3], primitive: u32) -> Hit {
+    let [a, b, c] = corners.map(|corner| shear(frame, corner));
+    weigh(frame, [edge(c, b), edge(a, c), edge(b, a)], [a[2], b[2], c[2]], primitive)
+}
+
+/// The parameter and the weights, evaluated in double precision and rounded once.
+#[inline(always)]
+fn weigh(frame: &Frame, [u, v, w]: [f64; 3], [a, b, c]: [f64; 3], primitive: u32) -> Hit {
+    let determinant = u + v + w;
     let depth = f64::from(frame.direction[frame.axes[2] as usize]);
-    let t = ((u * a[2] + v * b[2] + w * c[2]) / (determinant * depth)) as f32;
-    let hit = Hit { t, primitive, u: (v / determinant) as f32, v: (w / determinant) as f32 };
-    (frame.tmin <= t && t <= frame.tmax).then_some(hit)
+    let t = ((u * a + v * b + w * c) / (determinant * depth)) as f32;
+    Hit { t, primitive, u: (v / determinant) as f32, v: (w / determinant) as f32 }
 }
 
 /// A corner in sheared space. x and y are rounded to single precision step by step, in the order the vector filter

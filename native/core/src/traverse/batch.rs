@@ -163,8 +163,8 @@ impl<F: FnMut(usize, &Frame, Hit, P), P: Probe + Default, const ANY: bool> Singl
             let frame = self.rays.frame(index, &structure.domain)?;
             let mut probe = P::default();
             let stack = &mut self.room.stack;
-            let hit = kernel::trace::<S, P, GRIDS, ANY>(simd, structure, mesh, &frame, stack, &mut probe);
-            (self.take)(index, &frame, hit, probe);
+            let best = kernel::trace::<S, P, GRIDS, ANY>(simd, structure, mesh, &frame, stack, &mut probe);
+            (self.take)(index, &frame, best.answer::<ANY>(&frame, mesh), probe);
         }
         Ok(())
     }
@@ -203,7 +203,9 @@ impl<F: FnMut(usize, &Frame, Hit), const ANY: bool> Streams<'_, F, ANY> {
         let Room { stack, bins, lists } = &mut *self.room;
         let bin = &mut bins[octant];
         stream::trace::<S, GRIDS, ANY>(simd, structure, mesh, octant, bin, lists, stack);
-        bin.rays().for_each(|(index, frame, hit)| (self.take)(index, frame, *hit));
+        for (index, frame, best) in bin.rays() {
+            (self.take)(index, frame, best.answer::<ANY>(frame, mesh));
+        }
         bin.clear();
     }
 }

@@ -9,7 +9,6 @@
 
 use super::{frame::Frame, leaf::Search, probe::Probe};
 use crate::{
-    Mesh,
     accel::structure::{Grid, Structure},
     simd::Simd,
 };
@@ -27,10 +26,9 @@ struct Walk {
 pub fn walk<S: Simd, P: Probe, const ANY: bool>(
     search: &mut Search<'_, S, P>,
     structure: &Structure,
-    mesh: &Mesh,
     grid: &Grid,
 ) -> bool {
-    let Some(enter) = enter(search.frame, grid, search.best.t) else {
+    let Some(enter) = enter(search.frame, grid, search.best.high) else {
         return false;
     };
     let frame = search.frame;
@@ -38,11 +36,11 @@ pub fn walk<S: Simd, P: Probe, const ANY: bool>(
     loop {
         search.probe.step();
         let triangles = structure.cell(grid, walk.index as usize);
-        if !triangles.is_empty() && search.gather(mesh, triangles) && ANY {
+        if !triangles.is_empty() && search.gather::<ANY>(triangles) {
             return true;
         }
         let axis = walk.next_axis();
-        if search.best.t < walk.crossing[axis] || !walk.advance(axis, frame, grid) {
+        if search.best.high < walk.crossing[axis] || !walk.advance(axis, frame, grid) {
             return false;
         }
     }

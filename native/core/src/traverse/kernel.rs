@@ -1,11 +1,15 @@
 //! The loop: one ray against the whole structure, written once for every instruction set, probe, kind of query and
 //! kind of node.
 
-use super::{dda, frame::Frame, leaf::Search, probe::Probe};
+use super::{
+    dda,
+    frame::Frame,
+    leaf::{Best, Search},
+    probe::Probe,
+};
 use crate::{
     Mesh,
     accel::structure::{Node, NodeRef, Structure, Target},
-    ray::Hit,
     simd::Simd,
     triangle::{Block, LANES},
 };
@@ -62,8 +66,7 @@ impl<S: Simd> Planes<S> {
     }
 }
 
-/// The first hit along the ray in the order of [`Hit::precedes`], or, where `ANY`, some hit; in the frame's units, and
-/// with primitive MISS where there is none. `GRIDS` tells that the structure has grids.
+/// The first hit along the ray, or, where `ANY`, some hit. `GRIDS` tells that the structure has grids.
 #[inline(always)]
 pub fn trace<S: Simd, P: Probe, const GRIDS: bool, const ANY: bool>(
     simd: S,
@@ -72,9 +75,9 @@ pub fn trace<S: Simd, P: Probe, const GRIDS: bool, const ANY: bool>(
     frame: &Frame,
     stack: &mut [Entry],
     probe: &mut P,
-) -> Hit {
-    let mut search = Search::new(simd, frame, probe);
-    trace_below::<S, P, GRIDS, ANY>(&mut search, structure, mesh, structure.root, stack);
+) -> Best {
+    let mut search = Search { simd, frame, mesh, probe, best: Best::none(frame.tmax) };
+    trace_below::<S, P, GRIDS, ANY>(&mut search, structure, structure.root, stack);
     search.best
 }
 
@@ -83,7 +86,6 @@ pub fn trace<S: Simd, P: Probe, const GRIDS: bool, const ANY: bool>(
 pub fn trace_below<S: Simd, P: Probe, const GRIDS: bool, const ANY: bool>(
     search: &mut Search<'_, S, P>,
     structure: &Structure,
-    mesh: &Mesh,
     node: NodeRef,
     stack: &mut [Entry],
 ) {
@@ -97,23 +99,21 @@ pub fn trace_below<S: Simd, P: Probe, const GRIDS: bool, const ANY: bool>(
             Target::Branch(index) => {
                 search.probe.step();
                 let node = &nodes[index as usize];
-                let (met, near) = planes.meet(simd, node, search.best.t);
+                let (met, near) = planes.meet(simd, node, search.best.high);
                 if met != 0 {
                     current = descend(node, met, &near, stack, &mut depth);
                     continue;
                 }
                 false
             }
-            Target::Leaf { block, count } => search.block(&blocks[block as usize], count),
-            Target::Grid(index) if GRIDS => {
-                dda::walk::<S, P, ANY>(search, structure, mesh, &structure.grids[index as usize])
-            }
+            Target::Leaf { block, count } => search.block::<ANY>(&blocks[block as usize], count),
+            Target::Grid(index) if GRIDS => dda::walk::<S, P, ANY>(search, structure, &structure.grids[index as usize]),
             Target::Grid(_) | Target::Empty => false,
         };
         if ANY && found {
             return;
         }
-        match pop(stack, &mut depth, search.best.t) {
+        match pop(stack, &mut depth, search.best.high) {
             Some(node) => current = node,
             None => return,
         }

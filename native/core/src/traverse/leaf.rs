@@ -1,95 +1,138 @@
 //! Triangle tests in blocks of eight.
 
-use super::{frame::Frame, probe::Probe};
-use crate::{Mesh, ray::Hit, simd::Simd, triangle::Block, triangle::LANES};
+use super::{crossing::Sheared, frame::Frame, probe::Probe};
+use crate::{
+    Mesh,
+    ray::{Hit, MISS},
+    simd::Simd,
+    triangle::{self, Block, LANES},
+};
+
+/// The first hit so far in the order of [`Hit::precedes`], as exactly as need be.
+#[derive(Debug, Clone, Copy)]
+pub struct Best {
+    /// The parameter is at least this.
+    low: f32,
+    /// The parameter is at most this; nothing beyond is of interest.
+    pub high: f32,
+    /// The triangle, or [`MISS`].
+    pub primitive: u32,
+}
+
+impl Best {
+    /// Nothing yet, and interest in hits up to `tmax`.
+    #[inline(always)]
+    pub fn none(tmax: f32) -> Self {
+        Self { low: tmax, high: tmax, primitive: MISS }
+    }
+
+    #[inline(always)]
+    fn exactly(hit: &Hit) -> Self {
+        Self { low: hit.t, high: hit.t, primitive: hit.primitive }
+    }
+
+    /// What is told of the hit: all, or, where `ANY` will do, of which triangle it is.
+    #[inline(always)]
+    pub fn answer<const ANY: bool>(&self, frame: &Frame, mesh: &Mesh) -> Hit {
+        if ANY { Hit { primitive: self.primitive, ..Hit::MISS } } else { self.hit(frame, mesh) }
+    }
+
+    /// The hit, evaluated; in the frame's units.
+    #[inline(always)]
+    fn hit(&self, frame: &Frame, mesh: &Mesh) -> Hit {
+        if self.primitive == MISS {
+            return Hit::MISS;
+        }
+        triangle::evaluate(frame, corners(mesh, self.primitive), self.primitive)
+    }
+
+    /// Which of two hits whose intervals overlap comes first.
+    #[cold]
+    #[inline(never)]
+    fn settle(self, other: Self, frame: &Frame, mesh: &Mesh) -> Self {
+        let [one, two] =
+            [self, other].map(|best| if best.low < best.high { best.evaluated(frame, mesh) } else { best });
+        if (two.low, two.primitive) < (one.low, one.primitive) { two } else { one }
+    }
+
+    fn evaluated(self, frame: &Frame, mesh: &Mesh) -> Self {
+        Self::exactly(&self.hit(frame, mesh))
+    }
+}
+
+#[inline(always)]
+fn corners(mesh: &Mesh, triangle: u32) -> [[f32; 3]; 3] {
+    mesh.corners(triangle).map(|corner| corner.to_array())
+}
 
 /// The best hit so far, and the ray it belongs to.
 pub struct Search<'a, S: Simd, P> {
     pub simd: S,
     pub frame: &'a Frame,
+    pub mesh: &'a Mesh,
     pub probe: &'a mut P,
-    pub best: Hit,
+    pub best: Best,
 }
 
-impl<'a, S: Simd, P: Probe> Search<'a, S, P> {
-    /// Nothing found yet: only hits within the frame's interval will count.
+impl<S: Simd, P: Probe> Search<'_, S, P> {
+    /// Test the first `count` triangles of a block; true once there is any hit in it, where `ANY` is wanted.
     #[inline(always)]
-    pub fn new(simd: S, frame: &'a Frame, probe: &'a mut P) -> Self {
-        Self { simd, frame, probe, best: Hit { t: frame.tmax, ..Hit::MISS } }
+    pub fn block<const ANY: bool>(&mut self, block: &Block, count: u32) -> bool {
+        self.probe.tests(count);
+        let sheared = Sheared::new(self.simd, self.frame, block);
+        let candidates = !sheared.missed(self.simd) & ((1 << count) - 1);
+        candidates != 0 && self.candidates::<ANY>(block, &sheared, candidates)
     }
 
-    /// Test the first `count` triangles of a block; true once there is any hit in it.
-    ///
-    /// The vector part is a filter that never discards a hit: rounding is monotonic, so two edge functions of opposite
-    /// sign in single precision have opposite signs exactly, and whatever overflows, underflows or is zero passes.
-    /// What passes is decided by [`Block::intersect`].
+    /// Test the triangles that may be hit.
     #[inline(always)]
-    pub fn block(&mut self, block: &Block, count: u32) -> bool {
-        self.probe.tests(count);
-        let mut candidates = !self.surely_missed(block) & ((1 << count) - 1);
-        let mut any = false;
+    fn candidates<const ANY: bool>(&mut self, block: &Block, sheared: &Sheared<S>, candidates: u32) -> bool {
+        let crossings = sheared.cross(self.simd, self.frame, self.frame.tmin, self.best.high);
+        let mut candidates = candidates & !crossings.outside;
+        if ANY && candidates & crossings.sure != 0 {
+            self.best.primitive =
+                block.primitive[(candidates & crossings.sure).trailing_zeros() as usize & (LANES - 1)];
+            return true;
+        }
         while candidates != 0 {
-            let lane = candidates.trailing_zeros() as usize;
+            let lane = candidates.trailing_zeros() as usize & (LANES - 1);
             candidates &= candidates - 1;
-            if let Some(hit) = block.intersect(lane & (LANES - 1), self.frame) {
-                any = true;
-                if hit.precedes(&self.best) {
-                    self.best = hit;
-                }
+            let hit = if crossings.sure >> lane & 1 == 1 {
+                Best { low: crossings.low[lane], high: crossings.high[lane], primitive: block.primitive[lane] }
+            } else if let Some(hit) = block.intersect(lane, self.frame) {
+                Best::exactly(&hit)
+            } else {
+                continue;
+            };
+            self.offer(hit);
+            if ANY {
+                return true;
             }
         }
-        any
-    }
-
-    /// The lanes in which two edge functions have opposite signs.
-    #[inline(always)]
-    fn surely_missed(&self, block: &Block) -> u32 {
-        let simd = self.simd;
-        let a = self.shear(&block.corner[0]);
-        let b = self.shear(&block.corner[1]);
-        let c = self.shear(&block.corner[2]);
-        let (u, v, w) = (edge(simd, c, b), edge(simd, a, c), edge(simd, b, a));
-        let least = simd.min(simd.min(u, v), w);
-        let greatest = simd.max(simd.max(u, v), w);
-        simd.straddles_zero(least, greatest)
-    }
-
-    /// Corners in sheared space, rounded as in the exact test.
-    #[inline(always)]
-    fn shear(&self, corner: &[[f32; LANES]; 3]) -> [S::F32; 2] {
-        let (simd, frame) = (self.simd, self.frame);
-        let [kx, ky, kz] = frame.axes;
-        let x = self.relative(corner, kx);
-        let y = self.relative(corner, ky);
-        let z = self.relative(corner, kz);
-        let x = simd.sub(x, simd.mul(simd.splat(frame.shear[0]), z));
-        let y = simd.sub(y, simd.mul(simd.splat(frame.shear[1]), z));
-        [x, y]
+        false
     }
 
     #[inline(always)]
-    fn relative(&self, corner: &[[f32; LANES]; 3], axis: u32) -> S::F32 {
-        let axis = axis as usize;
-        self.simd.sub(self.simd.load(&corner[axis]), self.simd.splat(self.frame.origin[axis]))
+    fn offer(&mut self, hit: Best) {
+        if hit.high < self.best.low {
+            self.best = hit;
+        } else if hit.low <= self.best.high {
+            self.best = self.best.settle(hit, self.frame, self.mesh);
+        }
     }
 
-    /// Test triangles by index, eight at a time; true once there is any hit among them.
+    /// Test triangles by index, eight at a time; true once there is any hit among them, where `ANY` is wanted.
     #[inline(always)]
-    pub fn gather(&mut self, mesh: &Mesh, triangles: &[u32]) -> bool {
-        let mut any = false;
+    pub fn gather<const ANY: bool>(&mut self, triangles: &[u32]) -> bool {
         for group in triangles.chunks(LANES) {
             let mut block = Block::EMPTY;
             for (lane, &triangle) in group.iter().enumerate() {
-                block.set(lane, triangle, mesh.corners(triangle));
+                block.set(lane, triangle, self.mesh.corners(triangle));
             }
-            any |= self.block(&block, group.len() as u32);
+            if self.block::<ANY>(&block, group.len() as u32) {
+                return true;
+            }
         }
-        any
+        false
     }
-}
-
-/// Twice the signed areas of the triangles of the origin, `p` and `q`.
-#[inline(always)]
-fn edge<S: Simd>(simd: S, p: [S::F32; 2], q: [S::F32; 2]) -> S::F32 {
-    simd.sub(simd.mul(p[0], q[1]), simd.mul(p[1], q[0]))
 }

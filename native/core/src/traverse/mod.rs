@@ -1,6 +1,7 @@
 //! Finding what rays hit: one loop over branches, leaves and grids, and the batches that feed it.
 
 mod batch;
+mod crossing;
 mod dda;
 #[allow(dead_code)] // Until the traversers that come next call it.
 mod exact;

@@ -6,11 +6,16 @@
 //! Every ray keeps its own interval, boxes and triangles are tested by the arithmetic of the single ray, and the first
 //! hit in the order of [`Hit::precedes`] does not depend on the order of tests: results equal the single ray's.
 
-use super::{frame::Frame, kernel, leaf::Search, probe::Silent};
+use super::{
+    frame::Frame,
+    kernel,
+    leaf::{Best, Search},
+    probe::Silent,
+};
 use crate::{
     Mesh,
     accel::structure::{Node, NodeRef, Structure, Target},
-    ray::{Hit, MISS},
+    ray::MISS,
     simd::{GROUP, Simd},
     triangle::{Block, LANES},
 };
@@ -26,7 +31,7 @@ const FEW: usize = 3;
 #[derive(Debug, Default)]
 pub struct Bin {
     frames: Vec<Frame>,
-    hits: Vec<Hit>,
+    hits: Vec<Best>,
     indices: Vec<u32>,
 }
 
@@ -34,7 +39,7 @@ impl Bin {
     /// Add a ray of the batch.
     #[inline(always)]
     pub fn push(&mut self, index: usize, frame: Frame) {
-        self.hits.push(Hit { t: frame.tmax, ..Hit::MISS });
+        self.hits.push(Best::none(frame.tmax));
         self.frames.push(frame);
         self.indices.push(index as u32);
     }
@@ -45,8 +50,8 @@ impl Bin {
         self.frames.len() == BIN
     }
 
-    /// Batch index, frame and hit of every ray.
-    pub fn rays(&self) -> impl Iterator<Item = (usize, &Frame, &Hit)> {
+    /// Batch index, frame and first hit of every ray.
+    pub fn rays(&self) -> impl Iterator<Item = (usize, &Frame, &Best)> {
         let rays = self.indices.iter().zip(&self.frames).zip(&self.hits);
         rays.map(|((index, frame), hit)| (*index as usize, frame, hit))
     }
@@ -101,7 +106,7 @@ pub fn trace<S: Simd, const GRIDS: bool, const ANY: bool>(
                 let block = &blocks[block as usize];
                 for &id in &lists.ids[ids] {
                     let ray = Single { frame: &mut bin.frames[id as usize], best: &mut bin.hits[id as usize] };
-                    ray.block::<S, ANY>(simd, block, count);
+                    ray.block::<S, ANY>(simd, mesh, block, count);
                 }
             }
             Target::Branch(_) | Target::Grid(_) | Target::Empty => {
@@ -201,21 +206,20 @@ impl<S: Simd> OctantPlanes<S> {
 /// One ray of a bin.
 struct Single<'a> {
     frame: &'a mut Frame,
-    best: &'a mut Hit,
+    best: &'a mut Best,
 }
 
 impl Single<'_> {
     /// Test a block.
     #[inline(always)]
-    fn block<S: Simd, const ANY: bool>(self, simd: S, block: &Block, count: u32) {
+    fn block<S: Simd, const ANY: bool>(self, simd: S, mesh: &Mesh, block: &Block, count: u32) {
         if self.frame.tmin > self.frame.tmax {
             return;
         }
-        let mut search = Search { simd, frame: self.frame, probe: &mut Silent, best: *self.best };
-        if search.block(block, count) {
-            let best = search.best;
-            self.keep::<ANY>(best);
-        }
+        let mut search = Search { simd, frame: self.frame, mesh, probe: &mut Silent, best: *self.best };
+        search.block::<ANY>(block, count);
+        let best = search.best;
+        self.keep::<ANY>(best);
     }
 
     /// Go on alone below `node`.
@@ -231,16 +235,16 @@ impl Single<'_> {
         if self.frame.tmin > self.frame.tmax {
             return;
         }
-        let mut search = Search { simd, frame: self.frame, probe: &mut Silent, best: *self.best };
-        kernel::trace_below::<S, Silent, GRIDS, ANY>(&mut search, structure, mesh, node, stack);
+        let mut search = Search { simd, frame: self.frame, mesh, probe: &mut Silent, best: *self.best };
+        kernel::trace_below::<S, Silent, GRIDS, ANY>(&mut search, structure, node, stack);
         let best = search.best;
         self.keep::<ANY>(best);
     }
 
     /// Nothing beyond the best hit is of interest any more; where any hit will do, nothing at all.
     #[inline(always)]
-    fn keep<const ANY: bool>(self, best: Hit) {
+    fn keep<const ANY: bool>(self, best: Best) {
         *self.best = best;
-        self.frame.tmax = if ANY && best.primitive != MISS { f32::NEG_INFINITY } else { best.t };
+        self.frame.tmax = if ANY && best.primitive != MISS { f32::NEG_INFINITY } else { best.high };
     }
 }
