@@ -13,7 +13,7 @@ PORTABLE   := $(if $(filter Linux,$(shell uname)),--zig --compatibility manylinu
 VERSION    := $(shell sed -n 's/^version = "\(.*\)"/\1/p' blender_manifest.toml)
 ZIP        := dist/espalier-$(VERSION).zip
 
-.PHONY: help demo test test-aarch64 check format bench bench-instructions bench-interfaces bench-growth bench-threads package clean
+.PHONY: help demo study test test-aarch64 check format bench bench-instructions bench-interfaces bench-growth bench-threads package clean
 .DELETE_ON_ERROR:
 
 help: ## List these commands
@@ -21,6 +21,9 @@ help: ## List these commands
 
 demo: .venv/ready ## Trace a scene with every method and with Cycles: make demo [INPUT=file-or-scene-name]
 	$(BIN)/espalier compare "$(INPUT)" --resolution $(RESOLUTION) --cycles --out $(OUT)
+
+study: .venv/ready ## Measure every method on the paper's scenes: make study [INPUTS="dragon city"], report in out/study
+	$(BIN)/espalier study $(INPUTS)
 
 test: .venv/ready $(ZIP) ## Run every test that needs no installed Blender
 	$(CARGO) test --workspace

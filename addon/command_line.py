@@ -1,7 +1,7 @@
 """The command `espalier`: in a shell, and as `blender --command espalier`. It imports without bpy.
 
-Exit status: 0 done, 2 for input, options or a folder that cannot be used (one line on stderr says why), 130 for
-Ctrl C. Any other end is a bug, and shows its traceback.
+Exit status: 0 done, 1 where `study --check` found something slower, 2 for input, options or a folder that cannot be
+used (one line on stderr says why), 130 for Ctrl C. Any other end is a bug, and shows its traceback.
 """
 
 import argparse
@@ -15,18 +15,14 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from . import catalogue, input_kinds, native
-from .errors import EspalierAddonError
+from .arguments import UsageError, count, resolution, some_of
 from .images import write_png
 from .methods import METHOD_NAMES
 from .outputs import OutputFolder
+from .study import command as study_command
 from .terminal import ProgressLine, own_streams
 
-MAX_PIXELS = 65536
 USAGE_STATUS, INTERRUPTED_STATUS = 2, 130
-
-
-class UsageError(EspalierAddonError):
-    """An option that cannot be used."""
 
 
 class _Parser(argparse.ArgumentParser):
@@ -68,46 +64,21 @@ def _parser() -> argparse.ArgumentParser:
     compare = commands.add_parser("compare", help="compare acceleration methods, and Cycles, on one frame")
     compare.set_defaults(run=_compare)
     compare.add_argument("input", metavar="INPUT", help="a .blend, a mesh (.ply .obj .stl .glb), or a scene's name")
-    compare.add_argument("--methods", type=_methods, default=METHOD_NAMES, help=f"some of {','.join(METHOD_NAMES)}")
-    compare.add_argument("--resolution", type=_resolution, metavar="WxH", help="a .blend's own, else 1000x1000")
-    compare.add_argument("--samples", type=_count(1, 1 << 20), default=1, metavar="N", help="rays a pixel (1)")
-    compare.add_argument("--threads", type=_count(0, 1024), default=0, metavar="N", help="0, the default: all cores")
+    known = ",".join(METHOD_NAMES)
+    methods = some_of("method", METHOD_NAMES)
+    compare.add_argument("--methods", type=methods, default=METHOD_NAMES, help=f"some of {known}")
+    compare.add_argument("--resolution", type=resolution, metavar="WxH", help="a .blend's own, else 1000x1000")
+    compare.add_argument("--samples", type=count(1, 1 << 20), default=1, metavar="N", help="rays a pixel (1)")
+    compare.add_argument("--threads", type=count(0, 1024), default=0, metavar="N", help="0, the default: all cores")
     compare.add_argument("--cycles", action=argparse.BooleanOptionalAction, default=True, help="render with Cycles too")
-    compare.add_argument("--frame", type=_count(-1048574, 1048574), metavar="N", help="frame of a .blend")
+    compare.add_argument("--frame", type=count(-1048574, 1048574), metavar="N", help="frame of a .blend")
     compare.add_argument("--out", type=Path, metavar="DIR", help="where pictures and report go (out/NAME)")
+    study = commands.add_parser("study", help="measure methods over many scenes, and report it in one page")
+    study.set_defaults(run=lambda options: study_command.run(options, _blender))
+    study_command.add_arguments(study)
     scenes = commands.add_parser("scenes", help="list the scenes of the catalogue")
     scenes.set_defaults(run=_list_scenes)
     return parser
-
-
-def _methods(text: str) -> tuple[str, ...]:
-    names = tuple(dict.fromkeys(name.strip() for name in text.split(",") if name.strip()))
-    unknown = [name for name in names if name not in METHOD_NAMES]
-    if unknown or not names:
-        raise argparse.ArgumentTypeError(f"no method '{', '.join(unknown)}', choose from {', '.join(METHOD_NAMES)}")
-    return names
-
-
-def _resolution(text: str) -> tuple[int, int]:
-    sides = text.lower().split("x")
-    if len(sides) != 2 or not all(side.isascii() and side.isdigit() and 1 <= int(side) <= MAX_PIXELS for side in sides):
-        raise argparse.ArgumentTypeError(f"'{text}' is no WIDTHxHEIGHT of 1 to {MAX_PIXELS} pixels")
-    return int(sides[0]), int(sides[1])
-
-
-def _count(least: int, most: int) -> Any:
-    """A parser of whole numbers in a range."""
-
-    def parse(text: str) -> int:
-        try:
-            value = int(text)
-        except ValueError:
-            value = least - 1
-        if not least <= value <= most:
-            raise argparse.ArgumentTypeError(f"'{text}' is no whole number from {least} to {most}")
-        return value
-
-    return parse
 
 
 def _list_scenes(_options: argparse.Namespace) -> int:

@@ -17,7 +17,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from . import images, native
+from . import images, machine, native
 from .capture import export_frame
 from .cycles import Job, SecondBlender, command
 from .difference import flip, rmse
@@ -204,7 +204,7 @@ def begin(scene: bpy.types.Scene, settings: Settings, view_layer: bpy.types.View
             view_layer=data.view_layer,
             resolution=data.camera.resolution,
             samples=settings.options.samples,
-            threads=settings.options.threads or available_threads(),
+            threads=settings.options.threads or machine.available_threads(),
             use_scripts=bpy.context.preferences.filepaths.use_scripts_auto_execute and not bpy.app.autoexec_fail,
         )
         return Comparison(data, job, settings, folder).start()
@@ -242,33 +242,16 @@ def run(
     return comparison.outcome
 
 
-def available_threads() -> int:
-    """Cores this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
-
-
-def machine() -> str:
+def machine_line() -> str:
     """Processor, its cores and instruction set, system and Blender, for people."""
     parts = (
-        _processor(),
+        machine.processor(),
         f"{os.cpu_count()} cores",
         native.module().instruction_set(),
         f"{platform.system()} {platform.machine()}",
         f"Blender {bpy.app.version_string}",
     )
     return ", ".join(parts)
-
-
-def _processor() -> str:
-    """The processor's name: Linux keeps it where `platform` does not look."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
-    except OSError:
-        return platform.processor() or platform.machine()
-    named = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
-    return next(named, "") or platform.processor() or platform.machine()
 
 
 def _save_copy(path: Path) -> str:
@@ -302,7 +285,7 @@ def _report(data: SceneData, results: Sequence[MethodResult], job: Job) -> Repor
         scene=SceneSummary(data.name, data.triangle_count, data.vertex_count, data.instance_count),
         image=ImageSummary(width, height, job.samples),
         threads=job.threads,
-        machine=machine(),
+        machine=machine_line(),
         export_ms=data.export_ms,
         methods=tuple(method_summary(result) for result in results),
     )

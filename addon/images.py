@@ -54,13 +54,18 @@ def composite(ours: Picture, cycles: Picture, difference: Picture) -> Picture:
 
 
 def write_png(path: Path, picture: Picture) -> None:
-    """Write a picture as an 8-bit RGB PNG (W3C PNG 3rd edition; every row unfiltered)."""
+    """Write a picture as a PNG file."""
+    path.write_bytes(png(picture))
+
+
+def png(picture: Picture) -> bytes:
+    """A picture as an 8-bit RGB PNG (W3C PNG 3rd edition; every row unfiltered)."""
     height, width = picture.shape[:2]
     rows = np.zeros((height, 1 + 3 * width), np.uint8)
     rows[:, 1:] = picture[::-1].reshape(height, 3 * width)
     header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
     chunks = ((b"IHDR", header), (b"IDAT", zlib.compress(rows.tobytes(), 6)), (b"IEND", b""))
-    with path.open("wb") as stream:
-        stream.write(b"\x89PNG\r\n\x1a\n")
-        for kind, data in chunks:
-            stream.write(struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data)))
+    parts = [b"\x89PNG\r\n\x1a\n"]
+    for kind, data in chunks:
+        parts += [struct.pack(">I", len(data)), kind, data, struct.pack(">I", zlib.crc32(kind + data))]
+    return b"".join(parts)

@@ -1,8 +1,8 @@
-"""The folder a comparison is written to: all of its files, or none. No bpy."""
+"""The folder that results are written to: all of their files, or none. No bpy."""
 
 import shutil
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from .errors import EspalierAddonError
@@ -21,8 +21,10 @@ class OutputError(EspalierAddonError):
 class OutputFolder:
     """A folder to come. Use it as a context: without `publish`, nothing stays of it, nor of folders made for it."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, files: Sequence[str] = FILES) -> None:
+        """files: everything that may be written to it."""
         self.folder = folder
+        self._files = files
         self._made: list[Path] = []
         self._scratch: Path | None = None
 
@@ -40,16 +42,16 @@ class OutputFolder:
         return self
 
     def publish(self, writers: Mapping[str, Callable[[Path], object]]) -> None:
-        """Write every file aside, then move all of them in place; files of an earlier comparison go.
+        """Write every file aside, then move all of them in place; files of an earlier time go.
 
-        writers: by name in FILES, what writes the file to a given path. Raises OutputError.
+        writers: by name in `files`, what writes the file to a given path. Raises OutputError.
         """
         assert self._scratch is not None
-        assert writers.keys() <= set(FILES)
+        assert writers.keys() <= set(self._files)
         try:
             for name, write in writers.items():
                 write(self._scratch / name)
-            for name in FILES:
+            for name in self._files:
                 if name in writers:
                     (self._scratch / name).replace(self.folder / name)
                 else:

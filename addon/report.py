@@ -95,7 +95,7 @@ class Report:
             f"{image.width} x {image.height} pixels, {image.samples} {_plural(image.samples, 'sample')}, "
             f"{self.threads} {_plural(self.threads, 'thread')}"
         )
-        lines = [head, "", *_aligned([COLUMNS, *self._rows()])]
+        lines = [head, "", *aligned([COLUMNS, *self._rows()])]
         if self.cycles is not None:
             lines += [
                 "",
@@ -149,7 +149,7 @@ def _plural(count: int, noun: str) -> str:
     return noun if count == 1 else f"{noun}s"
 
 
-def _aligned(rows: Sequence[Sequence[str]]) -> list[str]:
+def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
     """Columns two spaces apart, the first to the left, the others to the right, a rule below the first row."""
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
     lines = [

@@ -168,11 +168,15 @@ class Run:
         return MethodResult(name, accelerator, accelerator.census(), render)
 
     def _config(self, name: str) -> dict[str, Any]:
-        """Seed, expected rays and this machine's costs, for the methods that know them."""
         width, height = self.data.camera.resolution
         expected_rays = self.options.expected_rays or float(width * height * self.options.samples)
-        wanted: dict[str, Any] = {"seed": self.options.seed, "expected_rays": expected_rays}
-        known = self._native.default_config(name)
-        if "node_ns" in known:
-            wanted |= calibration.cost_constants()
-        return {key: value for key, value in wanted.items() if key in known}
+        return build_config(name, self.options.seed, expected_rays)
+
+
+def build_config(name: str, seed: int, expected_rays: float) -> dict[str, Any]:
+    """Seed, expected rays and this machine's costs, for the methods that know them."""
+    wanted: dict[str, Any] = {"seed": seed, "expected_rays": expected_rays}
+    known = native.module().default_config(name)
+    if "node_ns" in known:
+        wanted |= calibration.cost_constants()
+    return {key: value for key, value in wanted.items() if key in known}

@@ -26,8 +26,8 @@ class ProgressLine:
         self._drawn = 0.0
         self._last = ""
 
-    def update(self, progress: float, status: str) -> None:
-        """Show 0..1 and what is going on; cheap to call often."""
+    def update(self, progress: float, status: str, detail: str = "") -> None:
+        """Show 0..1 and what is going on; cheap to call often. `detail`, which changes often, is for no log."""
         if not self._live:
             self._log(status)
             return
@@ -37,7 +37,8 @@ class ProgressLine:
         self._drawn = now
         filled = round(progress * BAR_WIDTH)
         bar = "#" * filled + "." * (BAR_WIDTH - filled)
-        self._stream.write(f"\r\x1b[K[{bar}] {progress:4.0%}  {now - self._start:5.1f} s  {status}")
+        told = f"{status}: {detail}" if detail else status
+        self._stream.write(f"\r\x1b[K[{bar}] {progress:4.0%}  {now - self._start:5.1f} s  {told}")
         self._stream.flush()
 
     def close(self) -> None:

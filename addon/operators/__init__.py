@@ -3,9 +3,9 @@
 import bpy
 
 from .. import results
-from . import build_trace, cancel, clear_results, compare
+from . import build_trace, cancel, clear_results, compare, study
 
-CLASSES = build_trace.CLASSES + compare.CLASSES + cancel.CLASSES + clear_results.CLASSES
+CLASSES = build_trace.CLASSES + compare.CLASSES + study.CLASSES + cancel.CLASSES + clear_results.CLASSES
 
 
 @bpy.app.handlers.persistent

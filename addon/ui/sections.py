@@ -35,6 +35,7 @@ def draw_run(layout: Layout, context: bpy.types.Context) -> None:
     column.scale_y = 1.25
     column.operator("espalier.build_trace", icon="RENDER_STILL")
     column.operator("espalier.compare", icon="IMAGE_RGB")
+    column.operator("espalier.study", icon="GRAPH")
     current = task.current()
     if current is not None:
         row = layout.row(align=True)

@@ -190,3 +190,38 @@ def test_the_second_blender_does_not_outlive_a_killed_first(tmp_path: Path) -> N
         (worker,) = workers(process.pid)
         process.kill()
     wait_for(lambda: not is_alive(worker), seconds=10.0)
+
+
+def test_a_study_takes_scenes_that_only_blender_opens(tmp_path: Path, scene: bpy.types.Scene) -> None:
+    data = bpy.data.meshes.new("Quad")
+    data.from_pydata([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], [], [(0, 1, 2, 3)])
+    scene.collection.objects.link(bpy.data.objects.new("Quad", data))
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "quad.blend"), copy=True)
+    out = tmp_path / "out"
+    options = ("--methods", "grid,bvh-sah", "--resolutions", "32x24", "--repeats", 2, "--no-embree", "--out", out)
+    done = run("study", tmp_path / "quad.blend", "cornell_box", *options)
+    assert (done.returncode, done.stderr) == (0, "")
+    content = json.loads((out / "study.json").read_text())
+    assert [entry["name"] for entry in content["scenes"]] == ["quad", "cornell_box"]
+    assert not any(row["failure"] for row in content["rows"])
+
+
+@pytest.mark.skipif(os.name != "posix", reason="Ctrl C is a POSIX signal here")
+@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGKILL])
+def test_an_interrupted_study_goes_on_with_the_same_command(tmp_path: Path, sent: signal.Signals) -> None:
+    out = tmp_path / "out"
+    options = ("cornell_box", "city", "--methods", "grid,bvh-sah", "--resolutions", "300x300", "--no-embree")
+    arguments = ("study", *options, "--repeats", 6, "--out", out)
+    with subprocess.Popen(command(*arguments), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
+        journal = out / "runs.jsonl"
+        wait_for(lambda: journal.exists() and journal.read_text().count('"run"') > 2)
+        process.send_signal(sent)
+        _, err = process.communicate(timeout=20)
+    assert process.returncode == (130 if sent == signal.SIGINT else -signal.SIGKILL)
+    assert ("goes on from here" in err) == (sent == signal.SIGINT)
+    assert [path.name for path in out.iterdir()] == ["runs.jsonl"]
+    kept = journal.read_text().rpartition("\n")[0]
+    done = run(*arguments)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert journal.read_text().startswith(kept)
+    assert (out / "report.html").exists()

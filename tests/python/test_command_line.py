@@ -1,14 +1,18 @@
 """The command line where it needs no Blender: options, inputs that are none, lists, progress."""
 
 import io
+import json
 import subprocess
 import sys
 from pathlib import Path
 
+import espalier_rt
 import pytest
 
 from espalier import command_line, terminal
 from espalier.methods import METHOD_NAMES
+from espalier.study import command
+from espalier.study.plan import PAPER_SCENES
 
 CONFTEST = Path(__file__).resolve().parents[1] / "conftest.py"
 
@@ -37,6 +41,13 @@ def in_own_process(script: str) -> "subprocess.CompletedProcess[str]":
         ["compare", "suzanne", "--threads", "-1"],
         ["compare", "suzanne", "--frame", "1.5"],
         ["compare", "suzanne", "--denoise"],
+        ["study", "no-such-scene"],
+        ["study", "--methods", "octree"],
+        ["study", "--rays", "primary,secondary"],
+        ["study", "--resolutions", "640x480,640"],
+        ["study", "--repeats", "0"],
+        ["study", "--check", "nowhere/study.json"],
+        ["study", "--paper", "nowhere/paper.json"],
     ],
     ids=" ".join,
 )
@@ -70,6 +81,56 @@ def test_options_are_read_as_they_are_meant() -> None:
         ["compare", "a.blend", "--methods=grid,bvh-sah,grid", "--resolution=640X480", "--no-cycles", "--frame=-3"]
     )
     assert (full.methods, full.resolution, full.cycles, full.frame) == (("grid", "bvh-sah"), (640, 480), False, -3)
+
+
+def test_a_study_is_as_the_paper_did_unless_options_say_other() -> None:
+    parse = command_line._parser().parse_args
+    plain = command.plan_of(parse(["study", "--no-embree"]), None)
+    assert plain.scenes == PAPER_SCENES
+    assert plain.methods == tuple(espalier_rt.methods())
+    assert (plain.classes, plain.resolutions) == (("primary-shadow",), ((1000, 1000),))
+    options = [
+        "study",
+        "city",
+        "dragon",
+        "--methods=grid",
+        "--rays=ao,primary",
+        "--resolutions=64x48,9x9",
+        "--threads=1",
+    ]
+    full = command.plan_of(parse([*options, "--repeats=3", "--seconds=0", "--no-embree"]), None)
+    assert (full.scenes, full.methods, full.classes) == (("city", "dragon"), ("grid",), ("ao", "primary"))
+    assert (full.resolutions, full.threads, full.repeats, full.seconds) == (((64, 48), (9, 9)), 1, 3, 0.0)
+    again = command.plan_of(parse(["study", "--no-embree"]), {"plan": full.as_dict()})
+    assert again == full, "a check measures what the older study did"
+
+
+def test_a_study_of_a_mesh_needs_no_bpy_and_a_check_gives_the_status(tmp_path: Path) -> None:
+    script = f"""
+import sys
+sys.modules["bpy"] = None
+from espalier.command_line import main
+sys.exit(main([*{["study", "cornell_box", "--methods=grid,bvh-median", "--resolutions=32x24", "--repeats=6"]!r},
+    "--no-embree", "--out", {str(tmp_path / "out")!r}, *sys.argv[1:]]))
+"""
+    done = in_own_process(script)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.splitlines()[-1] == f"Report: {tmp_path / 'out' / 'report.html'}"
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {
+        "report.html",
+        "study.json",
+        "study.csv",
+        "runs.jsonl",
+    }
+    old = json.loads((tmp_path / "out" / "study.json").read_text())
+    for row in old["rows"]:
+        if row["method"] == "grid":
+            row["runs"] = [{"build_s": run["build_s"] / 1e3, "trace_s": run["trace_s"]} for run in row["runs"]]
+    (tmp_path / "old.json").write_text(json.dumps(old))
+    script = script.replace("*sys.argv[1:]", f"'--check', {str(tmp_path / 'old.json')!r}")
+    done = in_own_process(script)
+    assert done.returncode == 1
+    assert "SLOWER" in done.stdout
 
 
 def test_scenes_lists_every_scene_with_its_purpose(capsys: pytest.CaptureFixture[str]) -> None:
