@@ -1,4 +1,4 @@
-"""The five acceleration methods: their native names, labels and descriptions. No bpy."""
+"""The acceleration methods: their native names, labels and descriptions. No bpy."""
 
 from typing import NamedTuple
 
@@ -20,6 +20,12 @@ METHODS: tuple[Method, ...] = (
     Method(
         "bvh-sah", "BVH (SAH)", "Bounding volume hierarchy split where the surface area heuristic expects least work"
     ),
+    Method(
+        "bvh-clusters",
+        "BVH (Clusters)",
+        "The same heuristic over pairs of neighbouring triangles: half the build time, as good to trace",
+    ),
+    Method("lbvh", "Linear BVH", "Bounding volume hierarchy along a space-filling curve: the fastest to build"),
     Method("grid", "Uniform Grid", "One uniform grid of cells over the whole scene"),
     Method(
         "hybrid-sampled",

@@ -12,6 +12,8 @@ LESS, MORE = -1, 1
 SHORT_LABELS = {
     "bvh-median": "Median",
     "bvh-sah": "SAH",
+    "bvh-clusters": "Clusters",
+    "lbvh": "Linear",
     "grid": "Grid",
     "hybrid-sampled": "Sampled",
     "hybrid-cost": "Cost",

@@ -46,7 +46,7 @@ def test_default_settings_build_what_no_settings_build(method: str) -> None:
 @pytest.mark.parametrize(
     ("method", "config", "message"),
     [
-        ("bvh", None, "there is no method 'bvh'; choose one of: bvh-median, bvh-sah, grid"),
+        ("bvh", None, "there is no method 'bvh'; choose one of: bvh-median, bvh-sah, bvh-clusters, lbvh, grid"),
         ("grid", {"sah_bins": 8}, "grid has no setting 'sah_bins'; it has: seed"),
         ("grid", {1: 2}, "grid has no setting '1'"),
         ("grid", 7, "config must be a mapping"),

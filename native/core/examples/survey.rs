@@ -10,6 +10,7 @@ use espalier_core::{
     Accelerator, Config, Hits, Job, Mesh, Method,
     accel::{calibrate::calibrate, config::CostConstants},
     ray::MISS,
+    traverse::probe::Counts,
 };
 use glam::Vec3;
 
@@ -97,7 +98,7 @@ fn survey(name: &str, methods: &[Method], config: &Config, threads: usize) {
         let census = accelerator.census();
         print!("{:15} build {build:7.1} ms ({processor} ms of all processors)", method.name());
         for (set, rays) in &sets {
-            print!("  {set} {:6.1}", nanoseconds(&accelerator, rays));
+            print!("  {set} {:6.1} {}", nanoseconds(&accelerator, rays), counted(&accelerator, rays));
         }
         println!(
             "  nodes {} leaves {} grids {} cells {} ({} empty) refs {} depth {} sah {:.1}",
@@ -168,6 +169,15 @@ fn nanoseconds(accelerator: &Accelerator, batch: &RayBatch) -> f64 {
         (thread_ns() - start) / rays.len() as f64
     };
     (0..3).map(round).fold(f64::INFINITY, f64::min)
+}
+
+/// Mean steps and tests of a ray that walks alone.
+fn counted(accelerator: &Accelerator, batch: &RayBatch) -> String {
+    let rays = batch.rays();
+    let mut counts = vec![Counts::default(); rays.len()];
+    accelerator.counted(&rays, &mut counts, 1, &Job::new()).unwrap();
+    let mean = |part: fn(&Counts) -> u32| counts.iter().map(|c| f64::from(part(c))).sum::<f64>() / rays.len() as f64;
+    format!("({:.2} steps {:.2} tests)", mean(|counts| counts.steps), mean(|counts| counts.tests))
 }
 
 fn uniform(index: usize, dimension: u64) -> f32 {

@@ -1,7 +1,10 @@
 //! Stores for the bulk of a structure, in pages as large as the system gives them: rays jump about in them, and with
 //! pages of 4 KiB most jumps also miss the translation buffer.
 
-use std::{marker::PhantomData, ops::Deref};
+use std::{
+    marker::PhantomData,
+    ops::{Deref, DerefMut},
+};
 
 use bytemuck::Pod;
 use memmap2::MmapMut;
@@ -32,6 +35,14 @@ impl<T: Pod> Arena<T> {
         Ok(Self { map, ..Self::empty() })
     }
 
+    /// `len` values of zero bytes, whose pages cost nothing until they are written to.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`].
+    pub fn zeroed(len: usize, what: &'static str) -> Result<Self, Error> {
+        Ok(Self { len, ..Self::with_capacity(len, what)? })
+    }
+
     /// Append a value; there must be room.
     #[inline]
     pub fn push(&mut self, value: T) {
@@ -45,6 +56,13 @@ impl<T: Pod> Arena<T> {
     pub fn as_mut_slice(&mut self) -> &mut [T] {
         let Self { map, len, .. } = self;
         map.as_mut().map_or(&mut [], |map| bytemuck::cast_slice_mut(&mut map[..*len * size_of::<T>()]))
+    }
+}
+
+impl<T: Pod> DerefMut for Arena<T> {
+    #[inline]
+    fn deref_mut(&mut self) -> &mut [T] {
+        self.as_mut_slice()
     }
 }
 

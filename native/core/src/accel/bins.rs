@@ -21,14 +21,14 @@ pub struct Mapping {
 impl Mapping {
     /// Of records to `bins` bins.
     pub fn new(records: &[Record], bins: usize) -> Self {
-        let (lower, upper) = centres(records);
-        Self::between(lower, upper, bins)
+        Self::between(&Centres::of(records), bins)
     }
 
-    /// Of centres between two corners.
-    pub fn between(lower: Vec3A, upper: Vec3A, bins: usize) -> Self {
-        let scale = bins as f32 * (1.0 - 1e-6) / (upper - lower);
-        Self { lower, scale: Vec3A::select(scale.cmple(Vec3A::splat(f32::MAX)), scale, Vec3A::ZERO) }
+    /// Of centres in a box.
+    #[inline(always)]
+    pub fn between(centres: &Centres, bins: usize) -> Self {
+        let scale = bins as f32 * (1.0 - 1e-6) / (centres.upper - centres.lower);
+        Self { lower: centres.lower, scale: Vec3A::select(scale.cmple(Vec3A::splat(f32::MAX)), scale, Vec3A::ZERO) }
     }
 
     /// The bins of a centre, in the low bits: a number below 2^22 plus this constant has its integer there, and needs no
@@ -47,15 +47,18 @@ impl Mapping {
     }
 }
 
-/// The box around the centres of records.
-#[inline(always)]
-pub fn centres(records: &[Record]) -> (Vec3A, Vec3A) {
-    let mut bounds = (Vec3A::INFINITY, Vec3A::NEG_INFINITY);
-    for record in records {
-        let centre = record.centre();
-        bounds = (bounds.0.min(centre), bounds.1.max(centre));
+/// The box around twice the centres of records.
+pub type Centres = BoundsA;
+
+impl Centres {
+    /// Of some records.
+    #[inline(always)]
+    pub fn of(records: &[Record]) -> Self {
+        records.iter().fold(Self::EMPTY, |all, record| {
+            let centre = record.centre();
+            all.union(&Self { lower: centre, upper: centre })
+        })
     }
-    bounds
 }
 
 /// A place to divide records at.
@@ -80,6 +83,7 @@ pub struct Side {
 impl Side {
     const EMPTY: Self = Self { bounds: BoundsA::EMPTY, count: 0 };
 
+    /// Take in more.
     #[inline(always)]
     fn add(&mut self, bounds: &BoundsA, count: u32) {
         self.bounds = self.bounds.union(bounds);
@@ -125,11 +129,12 @@ impl Bins {
         }
     }
 
-    /// Add what is in as many other bins.
-    pub fn add(&mut self, other: &Self) {
+    /// Together with what is in as many other bins.
+    pub fn with(mut self, other: Self) -> Self {
         for (mine, theirs) in self.bins.iter_mut().flatten().zip(other.bins.iter().flatten()) {
             mine.add(&theirs.bounds, theirs.count);
         }
+        self
     }
 
     /// The cheapest plane with records on both of its sides.

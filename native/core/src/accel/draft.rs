@@ -22,17 +22,20 @@ pub struct Draft {
     pub root: NodeRef,
     /// Most entries a traversal can put on its stack.
     pub stack_size: usize,
+    /// How many triangles are in its leaves.
+    pub triangles: usize,
 }
 
 impl Draft {
     /// Nothing.
-    pub const EMPTY: Self = Self { nodes: Vec::new(), leaves: Vec::new(), root: NodeRef::EMPTY, stack_size: 0 };
+    pub const EMPTY: Self =
+        Self { nodes: Vec::new(), leaves: Vec::new(), root: NodeRef::EMPTY, stack_size: 0, triangles: 0 };
 
     /// Forget everything but the room.
     pub fn clear(&mut self) {
         self.nodes.clear();
         self.leaves.clear();
-        (self.root, self.stack_size) = (NodeRef::EMPTY, 0);
+        (self.root, self.stack_size, self.triangles) = (NodeRef::EMPTY, 0, 0);
     }
 
     /// Add a leaf of one to eight triangles.
@@ -44,6 +47,7 @@ impl Draft {
             count += 1;
         }
         self.leaves.push(leaf);
+        self.triangles += count;
         NodeRef::leaf(self.leaves.len() - 1, count)
     }
 }

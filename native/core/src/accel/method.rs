@@ -9,6 +9,10 @@ pub enum Method {
     BvhMedian,
     /// Binned surface area heuristic.
     BvhSah,
+    /// The same over clusters of neighbours.
+    BvhClusters,
+    /// Divided where Morton codes first differ.
+    Lbvh,
     /// One uniform grid.
     Grid,
     /// The paper's hybrid: sampled rays decide which nodes become grids.
@@ -40,6 +44,10 @@ pub enum Judgement {
 pub enum Recipe {
     /// A binary tree, packed.
     Hierarchy(Hierarchy),
+    /// Straight to wide nodes, [over clusters](super::clustered).
+    Clustered,
+    /// Straight to wide nodes, [by Morton codes](super::lbvh).
+    Linear,
     /// One grid over everything.
     Grid,
     /// A median tree, some of whose nodes become grids.
@@ -63,6 +71,8 @@ struct Row {
 const ROWS: &[Row] = &[
     row(Method::BvhMedian, "bvh-median", Recipe::Hierarchy(Hierarchy::Median), 2),
     row(Method::BvhSah, "bvh-sah", Recipe::Hierarchy(Hierarchy::Sah), 2),
+    row(Method::BvhClusters, "bvh-clusters", Recipe::Clustered, 3),
+    row(Method::Lbvh, "lbvh", Recipe::Linear, 2),
     row(Method::Grid, "grid", Recipe::Grid, 2),
     row(Method::HybridSampled, "hybrid-sampled", Recipe::Hybrid(Judgement::Sampled), 3),
     row(Method::HybridCost, "hybrid-cost", Recipe::Hybrid(Judgement::ExpectedCost), 3),

@@ -5,14 +5,20 @@ pub mod calibrate;
 pub mod cells;
 pub mod census;
 pub mod check;
+pub mod clustered;
+pub mod clusters;
 pub mod config;
 pub mod decision;
 pub mod draft;
 pub mod expected;
+pub mod forest;
 pub mod grid;
 pub mod hybrid;
+pub mod lbvh;
 pub mod median;
 pub mod method;
+pub mod morton;
+pub mod nearest;
 pub mod overlap;
 pub mod pack;
 pub mod places;
@@ -166,6 +172,8 @@ impl Builder<'_> {
     fn structure(&mut self, recipe: Recipe) -> Result<Structure, Error> {
         let tree = match recipe {
             Recipe::Hierarchy(hierarchy) => self.hierarchy(hierarchy)?,
+            Recipe::Clustered => return self.clustered(),
+            Recipe::Linear => return self.linear(),
             Recipe::Grid => self.single_grid()?,
             Recipe::Hybrid(Judgement::Sampled) => self.hybrid(&hybrid::Sampled)?,
             Recipe::Hybrid(Judgement::ExpectedCost) => self.hybrid(&expected::ExpectedCost)?,
@@ -183,6 +191,20 @@ impl Builder<'_> {
     fn divided(&mut self, split: &impl tree::Split) -> Result<Tree, Error> {
         let items = self.timed("bounds", |this| tree::items(this.mesh))?;
         self.timed("split", |this| tree::build(items, this.config.leaf_size, split, this.job))
+    }
+
+    fn clustered(&mut self) -> Result<Structure, Error> {
+        let Config { leaf_size, .. } = *self.config;
+        let keys = self.timed("sort", |this| morton::sorted(this.mesh, this.job))?;
+        let clusters = self.timed("clusters", |this| clusters::Clusters::of(&keys, this.mesh, leaf_size, this.job))?;
+        let (top, drafts) = self.timed("split", |this| clustered::plan(&clusters, leaf_size, this.job))?;
+        self.timed("write", |this| forest::write(&top, &drafts, this.mesh, this.job))
+    }
+
+    fn linear(&mut self) -> Result<Structure, Error> {
+        let keys = self.timed("sort", |this| morton::sorted(this.mesh, this.job))?;
+        let (top, drafts) = self.timed("split", |this| lbvh::plan(&keys, this.config.leaf_size, this.job))?;
+        self.timed("write", |this| forest::write(&top, &drafts, this.mesh, this.job))
     }
 
     fn hybrid(&mut self, judge: &impl hybrid::Judge) -> Result<Tree, Error> {

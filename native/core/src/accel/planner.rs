@@ -1,7 +1,7 @@
 //! The binned surface area heuristic straight to wide nodes: a node's largest child is divided until eight are side by
 //! side. No binary tree is kept; the records move between two buffers, so that a division is one pass without a branch.
 
-use std::ops::Range;
+use rayon::prelude::*;
 
 use super::{
     bins::{self, Bins, Mapping, Plane, Side},
@@ -11,158 +11,121 @@ use super::{
 };
 use crate::triangle::LANES;
 
-/// What is left to decide on.
-#[derive(Debug, Clone, Copy)]
-pub struct Set {
-    /// In which buffer its records are.
-    buffer: usize,
-    begin: usize,
-    end: usize,
+/// What is left to decide on: records, as much room again, and what they are together.
+#[derive(Debug)]
+pub struct Set<'r> {
+    records: &'r mut [Record],
+    spare: &'r mut [Record],
     depth: usize,
     side: Side,
 }
 
-impl Set {
+impl<'r> Set<'r> {
+    /// All of some records; there must be as much spare room.
+    pub fn new(records: &'r mut [Record], spare: &'r mut [Record]) -> Self {
+        let side = Side::of(records);
+        Self { records, spare, depth: 0, side }
+    }
+
     /// How many triangles it has.
     pub fn count(&self) -> usize {
         self.side.count as usize
     }
 
-    fn range(&self) -> Range<usize> {
-        self.begin..self.end
+    /// Its records.
+    pub fn into_records(self) -> &'r [Record] {
+        self.records
+    }
+
+    /// The first `middle` records, on `left`, and the others.
+    #[inline(always)]
+    fn split(self, middle: usize, [left, right]: [Side; 2]) -> [Self; 2] {
+        let (records, spare) = (self.records.split_at_mut(middle), self.spare.split_at_mut(middle));
+        let depth = self.depth + 1;
+        [
+            Self { records: records.0, spare: spare.0, depth, side: left },
+            Self { records: records.1, spare: spare.1, depth, side: right },
+        ]
     }
 }
 
 /// Below this depth of divisions records are halved as they stand, which bounds the stack of every traversal.
 const MOST_DEPTH: usize = 64;
 
+/// Larger sets are put into bins in parallel, in parts of this size.
+const PART: usize = 1 << 14;
+
 /// Bins for a number of records: few records do not need the sixteen that Wald finds enough, and clearing and sweeping
 /// bins is most of the work for them.
 #[inline(always)]
-pub fn bins_for(records: usize) -> usize {
+fn bins_for(records: usize) -> usize {
     bins::MOST.min(4 + records / 32)
 }
 
-/// Room to plan in, reused from subtree to subtree.
-#[derive(Debug, Clone)]
-pub struct Planner {
-    buffers: [Vec<Record>; 2],
-    bins: Bins,
-}
-
-impl Default for Planner {
-    fn default() -> Self {
-        Self { buffers: [Vec::new(), Vec::new()], bins: Bins::EMPTY }
-    }
-}
-
-impl Planner {
-    /// Add a subtree over records to an empty draft; they refer to `triangles`. At most `leaf_size` triangles are
-    /// together in a leaf, and no record has more.
-    pub fn plan(
-        &mut self,
-        records: impl Iterator<Item = Record>,
-        triangles: &[u32],
-        leaf_size: usize,
-        draft: &mut Draft,
-    ) {
-        self.buffers[0].clear();
-        self.buffers[0].extend(records);
-        let count = self.buffers[0].len();
-        self.buffers[1].resize(count.max(self.buffers[1].len()), Record::NONE);
-        let set = Set { buffer: 0, begin: 0, end: count, depth: 0, side: Side::of(&self.buffers[0]) };
-        let mut work = Work { planner: self, triangles, leaf_size, draft };
-        let root = work.subtree(&set);
-        (draft.root, draft.stack_size) = root;
-    }
-}
-
-struct Work<'a> {
-    planner: &'a mut Planner,
-    triangles: &'a [u32],
-    leaf_size: usize,
-    draft: &'a mut Draft,
-}
-
-impl Work<'_> {
-    /// Returns where it is, and the entries a traversal needs on its stack.
-    fn subtree(&mut self, set: &Set) -> (NodeRef, usize) {
-        if set.count() <= self.leaf_size {
-            return (self.leaf(set), 0);
+/// Up to eight parts of a set, side by side: whichever has the largest box is divided first, those of at most `whole`
+/// triangles never. After Wald, Benthin and Boulos, "Getting Rid of Packets", RT 2008.
+#[inline(always)]
+pub fn open<'r>(set: Set<'r>, whole: usize, bins: &mut Bins) -> [Option<Set<'r>>; LANES] {
+    let mut parts = [const { None::<Set<'r>> }; LANES];
+    let mut areas = [-1.0; LANES];
+    areas[0] = f32::MAX;
+    parts[0] = Some(set);
+    for count in 1..LANES {
+        let largest = (1..count).fold(0, |best, lane| if areas[lane] > areas[best] { lane } else { best });
+        if areas[largest] < 0.0 {
+            break;
         }
-        let (children, count) = self.open(set);
-        let slot = self.draft.nodes.len();
-        self.draft.nodes.push([NodeRef::EMPTY; LANES]);
-        let mut deepest = 0;
-        for lane in 0..count {
-            let (child, below) = self.subtree(&children[lane]);
-            self.draft.nodes[slot][lane] = child;
-            deepest = deepest.max(below);
-        }
-        (NodeRef::branch(slot), count - 1 + deepest)
+        let Some(set) = parts[largest].take() else { break };
+        let [left, right] = divide(set, bins);
+        let area = |set: &Set<'_>| if set.count() <= whole { -1.0 } else { set.side.bounds.half_area() };
+        (areas[largest], areas[count]) = (area(&left), area(&right));
+        (parts[largest], parts[count]) = (Some(left), Some(right));
     }
-
-    fn leaf(&mut self, set: &Set) -> NodeRef {
-        let records = &self.planner.buffers[set.buffer][set.range()];
-        self.draft.push_leaf(records.iter().flat_map(|record| self.triangles[record.range()].iter().copied()))
-    }
-
-    /// Up to eight parts of a set.
-    fn open(&mut self, set: &Set) -> ([Set; LANES], usize) {
-        let (mut parts, mut areas, mut count) = ([*set; LANES], [0.0f32; LANES], 1);
-        areas[0] = f32::MIN_POSITIVE;
-        while count < LANES {
-            let largest = (1..count).fold(0, |best, lane| if areas[lane] > areas[best] { lane } else { best });
-            if areas[largest] < 0.0 {
-                break;
-            }
-            let [left, right] = self.planner.divide(&parts[largest]);
-            (parts[largest], parts[count]) = (left, right);
-            (areas[largest], areas[count]) = (self.priority(&left), self.priority(&right));
-            count += 1;
-        }
-        (parts, count)
-    }
-
-    /// The area of what may be divided; less than none for a leaf.
-    fn priority(&self, set: &Set) -> f32 {
-        if set.count() <= self.leaf_size { -1.0 } else { set.side.bounds.half_area() }
-    }
+    parts
 }
 
-impl Planner {
-    fn divide(&mut self, set: &Set) -> [Set; 2] {
-        let plane = if set.depth < MOST_DEPTH { self.best_plane(set) } else { None };
-        match plane {
-            Some((plane, mapping)) => self.partition(set, &plane, &mapping),
-            None => self.halve(set),
+#[inline(always)]
+fn divide<'r>(set: Set<'r>, bins: &mut Bins) -> [Set<'r>; 2] {
+    let plane = if set.depth < MOST_DEPTH { best_plane(set.records, bins) } else { None };
+    match plane {
+        Some((plane, mapping)) => {
+            let middle = partition(set.records, set.spare, &plane, &mapping);
+            let set = Set { records: set.spare, spare: set.records, ..set };
+            set.split(middle, bins.sides(&plane))
+        }
+        None => {
+            let middle = set.records.len() / 2;
+            let sides = [Side::of(&set.records[..middle]), Side::of(&set.records[middle..])];
+            set.split(middle, sides)
         }
     }
+}
 
-    fn best_plane(&mut self, set: &Set) -> Option<(Plane, Mapping)> {
-        let records = &self.buffers[set.buffer][set.range()];
-        let used = bins_for(records.len());
+#[inline(always)]
+fn best_plane(records: &[Record], bins: &mut Bins) -> Option<(Plane, Mapping)> {
+    let used = bins_for(records.len());
+    let mapping = if records.len() <= PART {
         let mapping = Mapping::new(records, used);
-        self.bins.fill(records, &mapping, used);
-        Some((self.bins.cheapest()?, mapping))
-    }
+        bins.fill(records, &mapping, used);
+        mapping
+    } else {
+        fill_parallel(records, bins, used)
+    };
+    Some((bins.cheapest()?, mapping))
+}
 
-    fn partition(&mut self, set: &Set, plane: &Plane, mapping: &Mapping) -> [Set; 2] {
-        let [left, right] = self.bins.sides(plane);
-        let [first, second] = &mut self.buffers;
-        let (from, to) = if set.buffer == 0 { (first, second) } else { (second, first) };
-        let middle = set.begin + partition(&from[set.range()], &mut to[set.range()], plane, mapping);
-        let set = Set { buffer: 1 - set.buffer, depth: set.depth + 1, ..*set };
-        [Set { end: middle, side: left, ..set }, Set { begin: middle, side: right, ..set }]
-    }
-
-    fn halve(&mut self, set: &Set) -> [Set; 2] {
-        let middle = (set.begin + set.end) / 2;
-        let records = &self.buffers[set.buffer];
-        let (left, right) = (Side::of(&records[set.begin..middle]), Side::of(&records[middle..set.end]));
-        let set = Set { depth: set.depth + 1, ..*set };
-        [Set { end: middle, side: left, ..set }, Set { begin: middle, side: right, ..set }]
-    }
+#[cold]
+fn fill_parallel(records: &[Record], bins: &mut Bins, used: usize) -> Mapping {
+    let parts = records.par_chunks(PART);
+    let both = |a: bins::Centres, b: bins::Centres| a.union(&b);
+    let mapping = Mapping::between(&parts.clone().map(bins::Centres::of).reduce(|| bins::Centres::EMPTY, both), used);
+    let filled = parts.map(|part| {
+        let mut bins = Bins::EMPTY;
+        bins.fill(part, &mapping, used);
+        bins
+    });
+    *bins = filled.reduce_with(Bins::with).unwrap_or(Bins::EMPTY);
+    mapping
 }
 
 /// Copy what lies before a plane to the front and the rest, backwards, to the end; returns how many went to the front.
@@ -178,4 +141,69 @@ fn partition(from: &[Record], to: &mut [Record], plane: &Plane, mapping: &Mappin
         right -= usize::from(!is_left);
     }
     left
+}
+
+/// Room to plan in, reused from subtree to subtree.
+#[derive(Debug, Clone)]
+pub struct Planner {
+    records: Vec<Record>,
+    spare: Vec<Record>,
+    bins: Bins,
+}
+
+impl Default for Planner {
+    fn default() -> Self {
+        Self { records: Vec::new(), spare: Vec::new(), bins: Bins::EMPTY }
+    }
+}
+
+impl Planner {
+    /// Fill an empty draft with the subtree over some records, which refer to `triangles`. At most `leaf_size` triangles
+    /// are together in a leaf, and no record has more.
+    pub fn plan(
+        &mut self,
+        records: impl Iterator<Item = Record>,
+        triangles: &[u32],
+        leaf_size: usize,
+        draft: &mut Draft,
+    ) {
+        self.records.clear();
+        self.records.extend(records);
+        let count = self.records.len();
+        self.spare.resize(count.max(self.spare.len()), Record::NONE);
+        let set = Set::new(&mut self.records, &mut self.spare[..count]);
+        let mut work = Work { bins: &mut self.bins, triangles, leaf_size, draft };
+        let (root, stack_size) = work.subtree(set);
+        (draft.root, draft.stack_size) = (root, stack_size);
+    }
+}
+
+struct Work<'a> {
+    bins: &'a mut Bins,
+    triangles: &'a [u32],
+    leaf_size: usize,
+    draft: &'a mut Draft,
+}
+
+impl Work<'_> {
+    /// Returns where it is, and the entries a traversal needs on its stack.
+    fn subtree(&mut self, set: Set<'_>) -> (NodeRef, usize) {
+        if set.count() <= self.leaf_size {
+            return (self.leaf(set.records), 0);
+        }
+        let slot = self.draft.nodes.len();
+        self.draft.nodes.push([NodeRef::EMPTY; LANES]);
+        let (mut count, mut deepest) = (0, 0);
+        for part in open(set, self.leaf_size, self.bins).into_iter().flatten() {
+            let (child, below) = self.subtree(part);
+            self.draft.nodes[slot][count] = child;
+            count += 1;
+            deepest = deepest.max(below);
+        }
+        (NodeRef::branch(slot), count - 1 + deepest)
+    }
+
+    fn leaf(&mut self, records: &[Record]) -> NodeRef {
+        self.draft.push_leaf(records.iter().flat_map(|record| &self.triangles[record.range()]).copied())
+    }
 }

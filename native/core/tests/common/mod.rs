@@ -225,7 +225,7 @@ pub fn run(name: &str, level: &str, test: impl Fn(&Walk)) {
 macro_rules! every_walk {
     ($tests:tt) => {
         $crate::every_walk!(@variants $tests;
-            bvh_median, bvh_sah, grid, hybrid_sampled, hybrid_cost, eager_sampled, eager_cost);
+            bvh_median, bvh_sah, bvh_clusters, lbvh, grid, hybrid_sampled, hybrid_cost, eager_sampled, eager_cost);
     };
     (@variants $tests:tt; $($variant:ident),+) => {
         #[test]
