@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from .paper import Paper
-from .plan import FALLBACK_REFERENCE, Group, family
+from .plan import FALLBACK_REFERENCE, PAPER_RAYS, Group, family
 from .report.svg import count, digits, seconds
 from .rows import Results, Row
 from .statistics import geometric_mean, slope
@@ -151,7 +151,7 @@ def _against_paper(results: Results, paper: Paper) -> Claim | None:
         )
     factors = []
     for group in results.groups():
-        for row in (row for row in paper.rows if row.scene == group.scene):
+        for row in (row for row in paper.rows if row.scene == group.scene and group.rays == PAPER_RAYS):
             for what, method in paper.methods.items():
                 ours, theirs = results.find(group, method), row.seconds[what]
                 if ours is not None and theirs is not None:
@@ -167,23 +167,28 @@ def _against_paper(results: Results, paper: Paper) -> Claim | None:
 def _steps(results: Results, _paper: Paper) -> Claim | None:
     """Spatial splits and reinsertion against the plain SAH hierarchy, by steps a ray."""
     better = [name for name in results.plan.methods if name == "sbvh" or name.endswith("+reinsert")]
-    figures, held = [], 0
-    for group in results.groups():
-        base = results.find(group, "bvh-sah")
-        for name in better:
-            row = results.find(group, name)
-            if base is None or row is None or not _steps_of(base) or not _steps_of(row):
-                continue
-            fewer = 1.0 - _steps_of(row) / _steps_of(base)
-            held += fewer >= FEWER_STEPS
-            figures.append(
-                f"{_name(results, group)}: {name} {digits(_steps_of(row))}, bvh-sah {digits(_steps_of(base))}: "
-                f"{abs(fewer):.0%} {'fewer' if fewer >= 0 else 'more'}"
-            )
+    figures, held, cases = [], 0, 0
+    for name in better:
+        told = []
+        for group in results.groups():
+            fewer = _fewer_steps(results.find(group, name), results.find(group, "bvh-sah"))
+            if fewer is not None:
+                cases += 1
+                held += fewer >= FEWER_STEPS
+                told.append(f"{_name(results, group)} {abs(fewer):.0%} {'fewer' if fewer >= 0 else 'more'}")
+        if told:
+            figures.append(f"{name}: {', '.join(told)}")
     if not figures:
         return None
     question = f"Do spatial splits and reinsertion lower the steps a ray by {FEWER_STEPS:.0%} over bvh-sah?"
-    return Claim(question, f"In {held} of {len(figures)} cases", tuple(figures))
+    return Claim(question, f"In {held} of {cases} cases", tuple(figures))
+
+
+def _fewer_steps(row: Row | None, base: Row | None) -> float | None:
+    """By which share a method makes fewer steps a ray than another; None where either is not known."""
+    if row is None or base is None or not _steps_of(base) or not _steps_of(row):
+        return None
+    return 1.0 - _steps_of(row) / _steps_of(base)
 
 
 def _steps_of(row: Row) -> float:

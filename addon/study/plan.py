@@ -15,6 +15,8 @@ RAY_CLASSES = {
 }
 """The kinds of rays, each with what it is."""
 
+PAPER_RAYS = "primary-shadow"
+
 PAPER_SCENES = ("bunny1", "bunny2", "horse1_sub", "horse2", "goldfish1_sub", "goldfish2_sub", "dragon")
 """The paper's seven scenes by their names in the catalogue, in the paper's order."""
 
@@ -56,7 +58,7 @@ class Plan:
 
     scenes: tuple[str, ...]
     methods: tuple[str, ...]
-    classes: tuple[str, ...] = ("primary-shadow",)
+    classes: tuple[str, ...] = (PAPER_RAYS,)
     resolutions: tuple[tuple[int, int], ...] = ((1000, 1000),)
     threads: int = 1
     repeats: int = 7

@@ -33,6 +33,16 @@ def test_compare_writes_pictures_and_report(blender: Blender, blend: Path, tmp_p
     assert "hybrid-sampled" in done.stdout
 
 
+def test_study_writes_its_report(blender: Blender, blend: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    options = ("--resolutions", "80x60", "--methods", "grid,hybrid-sampled", "--repeats", "2", "--out", out)
+    done = blender.run("--command", "espalier", "study", blend, "cornell_box", *options, timeout=240)
+    rows = json.loads((out / "study.json").read_text(encoding="utf-8"))["rows"]
+    assert {row["scene"] for row in rows} == {str(blend), "cornell_box"}
+    assert not any(row["failure"] for row in rows)
+    assert f"Report: {out / 'report.html'}" in done.stdout
+
+
 @pytest.mark.parametrize("bad", ["nowhere.blend", "no-such-scene"])
 def test_unknown_input_is_one_line_and_status_2(blender: Blender, tmp_path: Path, bad: str) -> None:
     out = tmp_path / "out"

@@ -47,6 +47,8 @@ ANSWERS = 3
 ALIVE_SECONDS = 2.0
 """A comparison takes several seconds; an interface that stands still for this long is noticed."""
 MANY_SAMPLES = 1 << 20
+MUCH_LARGER = 1000
+"""Percentage of a frame that a study works on for a while; it does not know samples."""
 
 
 @pytest.fixture(scope="module")
@@ -138,9 +140,23 @@ def slowest_answer_while_modal(desktop: Desktop) -> float:
         time.sleep(0.05)
 
 
-@pytest.mark.parametrize("operator", ["espalier.build_trace", "espalier.compare"])
+def test_run_study_writes_a_report(desktop: Desktop, blend: Path) -> None:
+    before = desktop.python(SNAPSHOT)
+    press(desktop, "espalier.study")
+    slowest = slowest_answer_while_modal(desktop)
+    assert slowest < ALIVE_SECONDS, "the interface stays alive"
+    desktop.settled("study")
+    assert desktop.python(SNAPSHOT) == before
+    (folder,) = blend.parent.glob(f"{blend.stem}-*-study")
+    assert {path.name for path in folder.iterdir()} == {"report.html", "study.json", "study.csv", "runs.jsonl"}
+
+
+@pytest.mark.parametrize("operator", ["espalier.build_trace", "espalier.compare", "espalier.study"])
 def test_escape_in_the_middle_stops_and_changes_nothing(desktop: Desktop, operator: str) -> None:
     desktop.python(f"window.scene.espalier.samples = {MANY_SAMPLES}")
+    desktop.python(
+        f"window.scene.render.resolution_percentage = {MUCH_LARGER if operator == 'espalier.study' else 100}"
+    )
     before = desktop.python(SNAPSHOT)
     idle = desktop.settled("idle")
     press(desktop, operator)
@@ -155,6 +171,7 @@ def test_escape_in_the_middle_stops_and_changes_nothing(desktop: Desktop, operat
     assert elapsed < ESCAPE_SECONDS + ANSWERS * overhead, f"an answer alone takes {overhead:.2f} s"
     assert desktop.python(SNAPSHOT) == before
     desktop.python("window.scene.espalier.samples = 1")
+    desktop.python("window.scene.render.resolution_percentage = 100")
     assert not [name for name in desktop.python(THREADS) if "espalier" in name]
 
 

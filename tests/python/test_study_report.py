@@ -15,7 +15,7 @@ from espalier.study.plan import Plan, StudyError
 from espalier.study.report import charts, marks, svg
 from espalier.study.report.page import page
 
-VOID = {"meta", "img"}
+VOID = {"meta", "img", "wbr"}
 
 
 class Balanced(HTMLParser):

@@ -1,6 +1,7 @@
 """The charts with axes: bars, time to image by number of rays, cost by triangles. No bpy."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from itertools import cycle, groupby
 from statistics import median
 from typing import NamedTuple
 
@@ -15,6 +16,9 @@ CLIP = 4.0
 
 RAYS = (1e3, 1e8)
 """Numbers of rays of the time-to-image charts."""
+
+MOST_MULTIPLE = 5.0
+"""Lines are followed up to this many times the fastest."""
 
 
 def bars(results: Results, group: Group) -> str:
@@ -86,37 +90,75 @@ def _meeting(first: Row, second: Row) -> float:
 
 
 def time_to_image(results: Results, group: Group) -> str:
-    """Build plus rays times the time a ray, on logarithmic axes; where the fastest changes is marked."""
+    """Build plus rays times the time a ray, on logarithmic axes, and below as multiples of the fastest; where the
+    fastest changes is marked."""
     rows = [row for row in results.of(group) if row.ray_s > 0.0]
     ours = [row for row in rows if family(row.method) != "reference"]
     if not ours:
         return ""
     found = [crossing for crossing in crossings(ours) if RAYS[0] <= crossing.rays <= RAYS[1]]
     named = marks.shown(results)
-    for crossing in found:
-        for name in (crossing.before, crossing.after):
-            named.setdefault(name, marks.OTHER_DASH)
-    left, right, top, bottom = 52, 400, 28, 300
-    across = Scale(*RAYS, left, right, log=True)
-    up = svg.log_scale([row.build_s + rays * row.ray_s for row in rows for rays in RAYS], bottom, top)
-    parts = [
-        svg.x_axis(across, top, bottom, "rays", svg.count),
-        svg.y_axis(up, left, right, "time to image", svg.seconds),
-    ]
+    others = dict.fromkeys(name for crossing in found for name in (crossing.before, crossing.after))
+    named |= dict(zip((name for name in others if name not in named), cycle(marks.OTHER_DASHES), strict=False))
     rows.sort(key=lambda row: row.method in named)
-    parts += [_cost_line(row, across, up, named) for row in rows]
-    ends = [(row.method, up(row.build_s + RAYS[1] * row.ray_s)) for row in rows if row.method in named]
+    left, right, top, bottom = 52, 400, 28, 240
+    across = Scale(*RAYS, left, right, log=True)
+    up = svg.log_scale([_cost(row, rays) for row in rows for rays in RAYS], bottom, top)
+    parts = [
+        svg.x_axis(across, top, bottom, "", svg.count),
+        svg.y_axis(up, left, right, "time to image", svg.seconds),
+        *(_cost_line(row, across, up, named) for row in rows),
+    ]
+    ends = [(row.method, up(_cost(row, RAYS[1]))) for row in rows if row.method in named]
     parts += _end_labels(ends, right, top, bottom)
     for crossing in found:
         told = f"from {svg.count(crossing.rays)} rays on, {crossing.after} is faster than {crossing.before}"
         parts.append(_dot(across(crossing.rays), up(crossing.seconds), told))
-    return svg.picture(520, bottom + 36, f"Time to image by number of rays, {group.label}", *parts)
+    parts.append(_multiples(rows, ours, found, across, named))
+    return svg.picture(520, 450, f"Time to image by number of rays, {group.label}", *parts)
+
+
+def _multiples(
+    rows: list[Row], ours: list[Row], found: list[Crossing], across: Scale, named: dict[str, str | None]
+) -> str:
+    """The same lines as multiples of the fastest of ours, which has the base line; what is far above is left out."""
+    top, bottom = 290, 414
+    up = Scale(1.0, MOST_MULTIPLE, bottom, top, log=True)
+    parts = [
+        svg.x_axis(across, top, bottom, "rays", svg.count),
+        svg.y_axis(up, across.start, across.end, "times the fastest", svg.digits),
+    ]
+    for row in (row for row in rows if row.method in named):
+        points = []
+        for rays in _ray_counts():
+            multiple = _cost(row, rays) / min(_cost(other, rays) for other in ours)
+            points.append((across(rays), up(multiple), 0.99 <= multiple <= MOST_MULTIPLE))
+        for part in _runs_inside(points):
+            parts.append(_line(row.method, part, row.method, named))
+    parts += [_dot(across(crossing.rays), up(1.0), crossing.after) for crossing in found]
+    return "".join(parts)
+
+
+def _runs_inside(points: list[tuple[float, float, bool]]) -> Iterator[list[tuple[float, float]]]:
+    """The pieces of a line whose points are inside, each of at least two."""
+    for inside, run in groupby(points, key=lambda point: point[2]):
+        part = [(x, y) for x, y, _ in run]
+        if inside and len(part) > 1:
+            yield part
+
+
+def _cost(row: Row, rays: float) -> float:
+    return row.build_s + rays * row.ray_s
+
+
+def _ray_counts() -> list[float]:
+    """Numbers of rays at which lines have points."""
+    steps = 100
+    return [RAYS[0] * (RAYS[1] / RAYS[0]) ** (index / steps) for index in range(steps + 1)]
 
 
 def _cost_line(row: Row, across: Scale, up: Scale, named: dict[str, str | None]) -> str:
-    steps = 60
-    numbers = [RAYS[0] * (RAYS[1] / RAYS[0]) ** (index / steps) for index in range(steps + 1)]
-    points = [(across(rays), up(row.build_s + rays * row.ray_s)) for rays in numbers]
+    points = [(across(rays), up(_cost(row, rays))) for rays in _ray_counts()]
     told = f"{row.method}: {svg.seconds(row.build_s)} build, then {svg.seconds(row.ray_s)} a ray"
     return _line(row.method, points, told, named)
 

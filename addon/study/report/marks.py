@@ -18,8 +18,8 @@ DASHES = {
 }
 """Dashes of the methods that charts always show."""
 
-OTHER_DASH = "9 3 2 3"
-"""Dash of a method that is shown because it does best; the best hybrid's line is whole."""
+OTHER_DASHES = ("9 3 2 3", "3 2", "12 3", "9 3 2 3 2 3")
+"""Dashes of methods that are shown because they do best somewhere; the best hybrid's line is whole."""
 
 
 def shown(results: Results) -> dict[str, str | None]:
@@ -30,7 +30,7 @@ def shown(results: Results) -> dict[str, str | None]:
     if hybrid is not None and hybrid not in names:
         names[hybrid] = None
     for name in ranked[:1]:
-        names.setdefault(name, OTHER_DASH)
+        names.setdefault(name, OTHER_DASHES[0])
     return names
 
 

@@ -5,7 +5,7 @@ from html import escape
 
 from ...report import memory
 from ..paper import Paper, PaperRow
-from ..plan import EMBREE, RAY_CLASSES, Group, family
+from ..plan import EMBREE, PAPER_RAYS, RAY_CLASSES, Group, family
 from ..rows import Results, Row
 from . import marks, small, svg
 from .svg import tag
@@ -13,7 +13,7 @@ from .svg import tag
 
 def paper_table(results: Results, paper: Paper) -> str:
     """The paper's rows: its sizes beside ours, its times beside ours as ratios."""
-    groups = {group.scene: group for group in reversed(results.groups())}
+    groups = {group.scene: group for group in reversed(results.groups()) if group.rays == PAPER_RAYS}
     rows = [row for row in paper.rows if row.scene in groups]
     if not rows:
         return ""
@@ -27,11 +27,12 @@ def paper_table(results: Results, paper: Paper) -> str:
         _wide("Triangles", 2),
         _wide("Triangles a vertex", 2),
         *(_wide(name, 3) for name in columns),
-        *(tag("th", f"Best hybrid ({name}), s", rowspan=2) for name in beside),
+        *(_wide("best hybrid", 1) for _ in beside),
     )
     second = tag(
         "tr",
-        *(tag("th", name) for name in ("paper", "ours") * 2 + ("paper s", "ours s", "paper / ours") * len(columns)),
+        *(tag("th", name) for name in ("paper", "ours") * 2 + ("paper s", "ours s", "ratio") * len(columns)),
+        *(tag("th", f"{name} s") for name in beside),
     )
     body = [_paper_row(results, groups[row.scene], row, methods, beside) for row in rows]
     table = small.scrolled(tag("table", tag("thead", first, second), tag("tbody", *body)))
@@ -39,7 +40,9 @@ def paper_table(results: Results, paper: Paper) -> str:
 
 
 def _paper_note(paper: Paper, rows: Sequence[PaperRow]) -> str:
-    note = f"{paper.source}. Seconds of build and trace together, {RAY_CLASSES['primary-shadow']}."
+    note = (
+        f"{paper.source}. Seconds of build and trace together; ratio: the paper's by ours; {RAY_CLASSES[PAPER_RAYS]}."
+    )
     if any(row.substitute for row in rows):
         note += " A star marks a model that stands in for the paper's, which could not be had."
     if not paper.has_times:
@@ -88,13 +91,14 @@ def winners(results: Results) -> str:
         ("Memory", lambda row: marks.census(row, "bytes")),
         ("Steps a ray", lambda row: row.evidence.steps if row.evidence else None),
     ):
-        parts += [tag("h3", name), _matrix(results, value)]
-    return "".join(parts)
+        parts.append(tag("div", tag("h3", name), _matrix(results, value), class_="matrix"))
+    return parts[0] + tag("div", *parts[1:], class_="matrices")
 
 
 def _matrix(results: Results, value: Callable[[Row], float | None]) -> str:
     groups = results.groups()
-    head_row = tag("tr", tag("th"), *(tag("th", escape(marks.scene_label(results, group))) for group in groups))
+    labels = (escape(marks.scene_label(results, group)).replace("_", "_<wbr>") for group in groups)
+    head_row = tag("tr", tag("th"), *(tag("th", label) for label in labels))
     methods = marks.by_family(list(results.plan.methods))
     least = {}
     for group in groups:
