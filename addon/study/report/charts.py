@@ -99,7 +99,7 @@ def time_to_image(results: Results, group: Group) -> str:
     found = [crossing for crossing in crossings(ours) if RAYS[0] <= crossing.rays <= RAYS[1]]
     named = marks.shown(results)
     others = dict.fromkeys(name for crossing in found for name in (crossing.before, crossing.after))
-    named |= dict(zip((name for name in others if name not in named), cycle(marks.OTHER_DASHES), strict=False))
+    named |= dict(zip((name for name in others if name not in named), cycle(marks.OTHER_DASHES[1:]), strict=False))
     rows.sort(key=lambda row: row.method in named)
     left, right, top, bottom = 52, 400, 28, 240
     across = Scale(*RAYS, left, right, log=True)

@@ -10,6 +10,7 @@ from ..paper import Paper
 from ..plan import EMBREE, FAMILIES, RAY_CLASSES, Group, family
 from ..rows import Results, Row
 from ..statistics import WANTED
+from ..task import LEAST_RUNS
 from . import charts, marks, small, svg
 from .svg import tag
 
@@ -188,9 +189,9 @@ def method(results: Results) -> str:
     runs = f"{counts[0]} to {counts[-1]}" if len(counts) > 1 else str(counts[0]) if counts else "0"
     lines = [
         f"Rays: {classes}. They come in blocks of pixels, and are the same for every method.",
-        f"Methods take turns on a scene's rays, round by round. A case is measured up to {plan.repeats} times, and no "
-        f"longer than about {plan.seconds:g} s in all, so slow methods have fewer runs ({runs} here); a build or "
-        f"trace that takes longer than {plan.limit_seconds:g} s is given up.",
+        f"Methods take turns on a scene's rays, round by round. A case is measured up to {plan.repeats} times "
+        f"while all of its runs stay within {plan.seconds:g} s, and {LEAST_RUNS} times where one does; so slow methods "
+        f"have fewer runs ({runs} here). A run that takes longer than {plan.limit_seconds:g} s is given up.",
         "Times are medians of wall time. Intervals are of order statistics: they enclose the true median with at "
         f"least {WANTED:.0%} confidence from six runs on, whatever the noise is like; with fewer runs they are the "
         "whole range.",
