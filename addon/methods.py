@@ -37,6 +37,11 @@ METHODS: tuple[Method, ...] = (
         "Hybrid (Cost)",
         "Bounding volume hierarchy whose nodes become grids where measured cost for the expected rays is lower",
     ),
+    Method(
+        "hybrid",
+        "Hybrid",
+        "A uniform grid divides the scene, and what is in a cell becomes a hierarchy when the first ray reaches it",
+    ),
 )
 
 METHOD_NAMES: tuple[str, ...] = tuple(method.name for method in METHODS)

@@ -17,6 +17,7 @@ SHORT_LABELS = {
     "grid": "Grid",
     "hybrid-sampled": "Sampled",
     "hybrid-cost": "Cost",
+    "hybrid": "Hybrid",
 }
 """What the methods are called where there is little room."""
 

@@ -164,6 +164,8 @@ class Census(TypedDict):
     grids: int
     cells: int
     empty_cells: int
+    lazy_cells: int
+    refined_cells: int
     references: int
     bytes: int
     max_depth: int

@@ -24,6 +24,7 @@ def test_compare_writes_pictures_and_report(blender: Blender, blend: Path, tmp_p
         "grid",
         "hybrid-sampled",
         "hybrid-cost",
+        "hybrid",
     ]
     assert report["scene"]["instances"] >= 3
     assert report["cycles"]["total_s"] > 0

@@ -19,6 +19,7 @@ def test_settings_are_on_the_scene(scene):
         "grid",
         "hybrid-sampled",
         "hybrid-cost",
+        "hybrid",
     }
 
 

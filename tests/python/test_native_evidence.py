@@ -15,7 +15,7 @@ def test_a_census_counts_what_is_there(method: str) -> None:
     assert census["method"] == method
     assert census["triangles"] == 20_000
     assert census["references"] >= 20_000
-    assert sum(census["depth_histogram"]) == census["nodes"] + census["leaves"] + census["grids"]
+    assert sum(census["depth_histogram"]) == sum(census[kind] for kind in ("nodes", "leaves", "grids", "lazy_cells"))
     assert len(census["depth_histogram"]) == census["max_depth"] + 1
     assert (census["grids"] > 0) == (census["cells"] > 0)
     assert census["empty_cells"] <= census["cells"]
@@ -31,6 +31,8 @@ def test_boxes_are_those_of_the_census_from_the_root_down(method: str) -> None:
     cells, census = accelerator.cells(), accelerator.census()
     found = [int(np.count_nonzero(cells.kind == kind)) for kind in range(4)]
     assert found == [census["nodes"], census["leaves"], census["grids"], census["cells"]]
+    assert np.count_nonzero(cells.kind >= 5) == census["lazy_cells"]
+    assert np.count_nonzero(cells.kind == 6) == census["refined_cells"]
     assert np.count_nonzero((cells.kind == 3) & (cells.count == 0)) == census["empty_cells"]
     assert not cells.truncated
     assert len(cells) == len(cells.depth) == len(cells.lower) == len(cells.upper) == len(cells.count)

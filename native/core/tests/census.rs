@@ -45,10 +45,13 @@ fn boxes_are_as_many_as_the_census_counts() {
         assert_eq!(count(CellKind::GridCell), census.cells);
         let empty = of_kind(&cells, CellKind::GridCell).filter(|&i| cells.count[i] == 0).count();
         assert_eq!(empty, census.empty_cells);
+        assert_eq!(count(CellKind::Lazy), census.lazy_cells - census.refined_cells);
         let ends = of_kind(&cells, CellKind::Leaf).chain(of_kind(&cells, CellKind::GridCell));
+        let ends = ends.chain(of_kind(&cells, CellKind::Lazy));
         assert_eq!(ends.map(|i| cells.count[i] as usize).sum::<usize>(), census.references);
         assert_eq!(cells.count[0] as usize, census.references);
-        assert_eq!(census.depth_histogram.iter().sum::<usize>(), census.nodes + census.leaves + census.grids);
+        let places = census.nodes + census.leaves + census.grids + census.lazy_cells;
+        assert_eq!(census.depth_histogram.iter().sum::<usize>(), places);
         assert_eq!(census.depth_histogram.len(), census.max_depth + 1);
         assert!(census.sah_cost > 0.0 && census.sah_cost.is_finite());
     }

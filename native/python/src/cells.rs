@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 use crate::arrays::{self, List, Table};
 
 /// Boxes of a structure, for drawing, in read-only arrays: from the root down, and within a depth first branches, then
-/// leaves, grids and grid cells. A grid's cells are one deeper than the grid.
+/// leaves, grids, lazy cells and grid cells. A grid's cells are one deeper than the grid.
 #[pyclass(frozen, module = "espalier_rt")]
 pub struct Cells {
     /// (n, 3) float32: least corners, in the mesh's coordinates.
@@ -15,7 +15,8 @@ pub struct Cells {
     /// (n, 3) float32: greatest corners.
     #[pyo3(get)]
     upper: Table<f32>,
-    /// (n,) uint8: 0 branch, 1 leaf, 2 grid (its whole box), 3 grid cell.
+    /// (n,) uint8: 0 branch, 1 leaf, 2 grid (its whole box), 3 grid cell, 5 lazy cell that no ray has reached, 6 lazy cell
+    /// that has become a subtree.
     #[pyo3(get)]
     kind: List<u8>,
     /// (n,) uint16: depth; the root has 0.

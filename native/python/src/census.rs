@@ -19,6 +19,8 @@ pub fn to_dict<'py>(py: Python<'py>, accelerator: &Accelerator, build_ms: f64) -
     dict.set_item("grids", census.grids)?;
     dict.set_item("cells", census.cells)?;
     dict.set_item("empty_cells", census.empty_cells)?;
+    dict.set_item("lazy_cells", census.lazy_cells)?;
+    dict.set_item("refined_cells", census.refined_cells)?;
     dict.set_item("references", census.references)?;
     dict.set_item("bytes", census.bytes)?;
     dict.set_item("max_depth", census.max_depth)?;

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::{
-    places::{Place, levels},
+    places::{Place, children, levels},
     structure::{Grid, Structure, Target},
 };
 use crate::{Error, bounds::Bounds, error};
@@ -20,6 +20,10 @@ pub enum CellKind {
     Grid = 2,
     /// One cell of a grid.
     GridCell = 3,
+    /// A lazy cell that no ray has reached.
+    Lazy = 5,
+    /// A lazy cell that has become a subtree.
+    Refined = 6,
 }
 
 /// Which boxes to list.
@@ -33,7 +37,8 @@ pub struct CellFilter {
     pub max_count: Option<usize>,
 }
 
-/// Boxes by column, from the root down; within a depth first branches, then leaves, grids and grid cells. The root has
+/// Boxes by column, from the root down; within a depth first branches, then leaves, grids, lazy cells and
+/// grid cells. The root has
 /// depth 0, a grid's cells are one deeper than the grid.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Cells {
@@ -58,7 +63,8 @@ impl Cells {
     /// [`Error::OutOfMemory`].
     pub fn of(structure: &Structure, bounds: &Bounds, filter: &CellFilter) -> Result<Self, Error> {
         let cells: usize = structure.grids.iter().map(Grid::cell_count).sum();
-        let all = structure.nodes.len() + structure.blocks.len() + structure.grids.len() + cells;
+        let places = structure.nodes.len() + structure.blocks.len() + structure.grids.len();
+        let all = places + structure.lazy.places() + cells;
         let most = filter.max_count.unwrap_or(usize::MAX);
         let mut list =
             Lister { structure, filter, most, totals: totals(structure), cells: Self::reserve(all.min(most))? };
@@ -106,10 +112,11 @@ struct Lister<'a> {
 impl Lister<'_> {
     /// List a level: its places, then the cells of the grids right above. False once the list is full.
     fn level(&mut self, depth: usize, above: &[Place], level: &[Place]) -> bool {
-        for wanted in [CellKind::Branch, CellKind::Leaf, CellKind::Grid] {
+        for wanted in [CellKind::Branch, CellKind::Leaf, CellKind::Grid, CellKind::Lazy, CellKind::Refined] {
             for place in level {
-                let count = references(self.structure, &self.totals, place.target);
-                if kind(place.target) == Some(wanted) && !self.push(&place.bounds, wanted, depth, count) {
+                let count = self.count(place);
+                if kind(self.structure, place.target) == Some(wanted) && !self.push(&place.bounds, wanted, depth, count)
+                {
                     return false;
                 }
             }
@@ -129,6 +136,15 @@ impl Lister<'_> {
         })
     }
 
+    fn count(&self, place: &Place) -> u32 {
+        match place {
+            Place { lazy: Some(_), target: Target::Branch(_), .. } => {
+                children(self.structure, place).map(|child| self.count(&child)).sum()
+            }
+            _ => references(self.structure, &self.totals, place.target),
+        }
+    }
+
     fn push(&mut self, bounds: &Bounds, kind: CellKind, depth: usize, count: u32) -> bool {
         if self.cells.len() == self.most {
             self.cells.truncated = true;
@@ -144,11 +160,13 @@ impl Lister<'_> {
     }
 }
 
-fn kind(target: Target) -> Option<CellKind> {
+fn kind(structure: &Structure, target: Target) -> Option<CellKind> {
     match target {
         Target::Branch(_) => Some(CellKind::Branch),
         Target::Leaf { .. } => Some(CellKind::Leaf),
         Target::Grid(_) => Some(CellKind::Grid),
+        Target::Lazy(cell) if structure.lazy.refined(cell as usize).is_some() => Some(CellKind::Refined),
+        Target::Lazy(_) => Some(CellKind::Lazy),
         Target::Empty => None,
     }
 }
@@ -172,6 +190,7 @@ fn references(structure: &Structure, totals: &[u32], target: Target) -> u32 {
             let grid = &structure.grids[index as usize];
             structure.starts[grid.first + grid.cell_count()] - structure.starts[grid.first]
         }
+        Target::Lazy(cell) => structure.lazy.triangles(cell as usize).len() as u32,
         Target::Empty => 0,
     }
 }

@@ -20,7 +20,11 @@ pub struct Census {
     pub cells: usize,
     /// Cells without a triangle.
     pub empty_cells: usize,
-    /// Triangles in leaves and in grid cells, each as often as it occurs.
+    /// Cells that become subtrees when a ray reaches them.
+    pub lazy_cells: usize,
+    /// How many of them have. Their nodes, leaves and references are among the others.
+    pub refined_cells: usize,
+    /// Triangles in leaves, grid cells and lazy cells, each as often as it occurs.
     pub references: usize,
     /// Bytes held, without the mesh.
     pub bytes: usize,
@@ -54,7 +58,16 @@ impl Census {
                 self.references += count as usize;
             }
             Target::Grid(index) => self.add_grid(structure, &structure.grids[index as usize]),
+            Target::Lazy(cell) => self.add_lazy(structure, cell as usize),
             Target::Empty => {}
+        }
+    }
+
+    fn add_lazy(&mut self, structure: &Structure, cell: usize) {
+        self.lazy_cells += 1;
+        match structure.lazy.refined(cell) {
+            Some(_) => self.refined_cells += 1,
+            None => self.references += structure.lazy.triangles(cell).len(),
         }
     }
 
@@ -73,7 +86,8 @@ impl Census {
 /// relates them to it, on every machine, so that numbers compare.
 pub fn sah_cost(structure: &Structure, bounds: &Bounds) -> f64 {
     let scene = half_area(bounds);
-    let places = levels(structure, bounds).flatten();
+    // A lazy cell counts the same before and after a ray has reached it.
+    let places = levels(structure, bounds).flatten().filter(|place| place.lazy.is_none());
     let total: f64 = places.map(|place| half_area(&place.bounds) * work(structure, &place)).sum();
     total / scene.max(f64::MIN_POSITIVE)
 }
@@ -82,6 +96,9 @@ fn half_area(bounds: &Bounds) -> f64 {
     let [x, y, z] = bounds.extent().as_dvec3().to_array();
     x * y + y * z + z * x
 }
+
+/// The share of a lazy cell's blocks that a line through it meets, whether it has become a subtree or not.
+const LAZY_BLOCKS: f64 = 0.5;
 
 /// What meeting a place costs, apart from what lies below it.
 fn work(structure: &Structure, place: &Place) -> f64 {
@@ -93,6 +110,10 @@ fn work(structure: &Structure, place: &Place) -> f64 {
             let grid = &structure.grids[index as usize];
             let share = half_area(&grid.cell_bounds(0)) / half_area(&place.bounds).max(f64::MIN_POSITIVE);
             share * cells_ns(structure, grid, &cost) / cost.node_ns
+        }
+        Target::Lazy(cell) => {
+            let blocks = structure.lazy.triangles(cell as usize).len().div_ceil(LANES);
+            1.0 + LAZY_BLOCKS * blocks as f64 * cost.block_ns / cost.node_ns
         }
         Target::Empty => 0.0,
     }

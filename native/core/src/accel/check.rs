@@ -3,8 +3,9 @@
 use glam::{DVec3, Vec3};
 
 use super::{
+    check_lazy,
     places::{self, Place, levels},
-    structure::{Grid, NodeRef, Structure, Target},
+    structure::{Grid, NodeRef, Structure, Target, View},
 };
 use crate::{Mesh, bounds::Bounds, ray::MISS, triangle::LANES};
 
@@ -16,7 +17,8 @@ const BRUTE_FORCE: usize = 1 << 22;
 /// # Panics
 /// With what is wrong.
 pub fn assert_well_formed(structure: &Structure, mesh: &Mesh) {
-    let places: Vec<Place> = levels(structure, &mesh.bounds()).flatten().collect();
+    let places = levels(structure, &mesh.bounds()).flatten().filter(|place| place.lazy.is_none());
+    let places: Vec<Place> = places.collect();
     assert_all_reached(structure, &places);
     let mut owner = vec![None; mesh.triangles().len()];
     for (index, place) in places.iter().enumerate() {
@@ -25,8 +27,9 @@ pub fn assert_well_formed(structure: &Structure, mesh: &Mesh) {
                 assert_branch(structure, node as usize, place);
                 continue;
             }
-            Target::Leaf { block, count } => assert_leaf(structure, mesh, block as usize, count as usize),
+            Target::Leaf { block, count } => assert_leaf(structure.view(), mesh, block as usize, count as usize),
             Target::Grid(grid) => assert_grid(structure, mesh, &structure.grids[grid as usize]),
+            Target::Lazy(cell) => check_lazy::assert_cell(structure, mesh, cell as usize, &place.bounds),
             Target::Empty => panic!("an empty place was reached"),
         };
         for primitive in primitives {
@@ -36,7 +39,7 @@ pub fn assert_well_formed(structure: &Structure, mesh: &Mesh) {
         }
     }
     assert_owned(mesh, &owner);
-    let needed = stack_need(structure, structure.root);
+    let needed = stack_need(structure, structure.view(), structure.root);
     assert!(structure.stack_size >= needed, "a stack of {} entries, {needed} needed", structure.stack_size);
 }
 
@@ -53,6 +56,8 @@ fn assert_all_reached(structure: &Structure, places: &[Place]) {
     assert_eq!(branches, all(structure.nodes.len()), "nodes not reached exactly once");
     assert_eq!(leaves, all(structure.blocks.len()), "blocks not reached exactly once");
     assert_eq!(grids, all(structure.grids.len()), "grids not reached exactly once");
+    let lazy = indices(|target| if let Target::Lazy(index) = target { Some(index) } else { None });
+    assert_eq!(lazy, all(structure.lazy.len()), "lazy cells not reached exactly once");
 }
 
 fn assert_branch(structure: &Structure, index: usize, place: &Place) {
@@ -74,8 +79,8 @@ fn assert_branch(structure: &Structure, index: usize, place: &Place) {
     }
 }
 
-fn assert_leaf(structure: &Structure, mesh: &Mesh, index: usize, count: usize) -> Vec<u32> {
-    let block = &structure.blocks[index];
+pub(super) fn assert_leaf(view: View<'_>, mesh: &Mesh, index: usize, count: usize) -> Vec<u32> {
+    let block = &view.blocks[index];
     assert!(block.primitive[count..].iter().all(|&primitive| primitive == MISS), "unused lanes of block {index}");
     for lane in 0..count {
         let corners = block.corner.map(|corner| Vec3::from_array(corner.map(|axis| axis[lane])));
@@ -149,22 +154,26 @@ fn assert_owned(mesh: &Mesh, owner: &[Option<usize>]) {
     assert_eq!(held, mesh.solid().len(), "triangles without area are held");
 }
 
-fn triangle_bounds(structure: &Structure, mesh: &Mesh, primitive: u32) -> Bounds {
+pub(super) fn triangle_bounds(structure: &Structure, mesh: &Mesh, primitive: u32) -> Bounds {
     Bounds::of_points(mesh.corners(primitive).map(|corner| corner - structure.domain.centre))
 }
 
-fn assert_contains(outer: &Bounds, inner: &Bounds) {
+pub(super) fn assert_contains(outer: &Bounds, inner: &Bounds) {
     let contains = outer.lower.cmple(inner.lower).all() && inner.upper.cmple(outer.upper).all();
     assert!(contains, "{outer:?} does not contain {inner:?}");
 }
 
 /// The most entries that a walk from a place can have on its stack: all children but the one that is visited, at every
 /// level.
-fn stack_need(structure: &Structure, place: NodeRef) -> usize {
-    let Target::Branch(index) = place.target() else {
-        return 0;
+fn stack_need(structure: &Structure, view: View<'_>, place: NodeRef) -> usize {
+    let node = match place.target() {
+        Target::Branch(index) => &view.nodes[index as usize],
+        Target::Lazy(cell) => {
+            let cell = structure.lazy.refined(cell as usize);
+            return cell.map_or(0, |cell| stack_need(structure, cell.view(), cell.root));
+        }
+        _ => return 0,
     };
-    let node = &structure.nodes[index as usize];
-    let below = (0..node.len()).map(|lane| stack_need(structure, node.child[lane])).max();
+    let below = (0..node.len()).map(|lane| stack_need(structure, view, node.child[lane])).max();
     node.len() - 1 + below.unwrap_or(0)
 }

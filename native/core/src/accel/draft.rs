@@ -84,7 +84,7 @@ impl Boxes {
         match child.target() {
             Target::Branch(node) => self.nodes[node as usize],
             Target::Leaf { block, .. } => self.leaves[block as usize],
-            Target::Grid(_) | Target::Empty => BoundsA::EMPTY,
+            _ => BoundsA::EMPTY,
         }
     }
 }

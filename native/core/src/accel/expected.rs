@@ -16,7 +16,6 @@ use super::{
 };
 use crate::{
     Error, Mesh,
-    arena::Arena,
     bounds::Bounds,
     ray::{Hit, MISS},
     simd::Level,
@@ -138,8 +137,7 @@ fn counted(grid: BuiltGrid, inquiry: &Inquiry<'_>, samples: &Samples) -> Result<
 /// A structure of one grid.
 pub fn alone(grid: BuiltGrid, domain: Domain) -> Structure {
     let BuiltGrid { grid, starts, references } = grid;
-    let (root, nodes, blocks, grids) = (NodeRef::grid(0), Arena::empty(), Arena::empty(), vec![grid]);
-    Structure { root, domain, nodes, blocks, grids, starts, references, stack_size: 0 }
+    Structure { grids: vec![grid], starts, references, ..Structure::of(NodeRef::grid(0), domain) }
 }
 
 /// What sample rays do in a structure of one grid. Counts are the same on every instruction set.

@@ -67,8 +67,7 @@ pub fn write(top: &Top, drafts: &[Draft], mesh: &Mesh, job: &Job) -> Result<Stru
         .collect();
     let root = write_top(top, &subtrees?, top_nodes, domain.centre.into());
     let (root, stack_size) = root.map_or((NodeRef::EMPTY, 0), |root| (root.root, root.stack_size));
-    let (grids, starts, references) = (Vec::new(), Vec::new(), Vec::new());
-    Ok(Structure { root, domain, nodes, blocks, grids, starts, references, stack_size })
+    Ok(Structure { nodes, blocks, stack_size, ..Structure::of(root, domain) })
 }
 
 fn sites<'a>(

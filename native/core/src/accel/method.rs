@@ -19,6 +19,8 @@ pub enum Method {
     HybridSampled,
     /// The same tree and samples, decided by expected cost.
     HybridCost,
+    /// A uniform grid divides the triangles, and what is in a cell becomes a subtree when the first ray reaches it.
+    Hybrid,
 }
 
 /// Which binary tree a hierarchy starts from.
@@ -52,6 +54,8 @@ pub enum Recipe {
     Grid,
     /// A median tree, some of whose nodes become grids.
     Hybrid(Judgement),
+    /// A hierarchy of [lazy cells](super::instant).
+    Lazy,
 }
 
 /// All that there is to know about a method.
@@ -76,6 +80,7 @@ const ROWS: &[Row] = &[
     row(Method::Grid, "grid", Recipe::Grid, 2),
     row(Method::HybridSampled, "hybrid-sampled", Recipe::Hybrid(Judgement::Sampled), 3),
     row(Method::HybridCost, "hybrid-cost", Recipe::Hybrid(Judgement::ExpectedCost), 3),
+    row(Method::Hybrid, "hybrid", Recipe::Lazy, 1),
 ];
 
 const fn row(method: Method, name: &'static str, recipe: Recipe, passes: u64) -> Row {

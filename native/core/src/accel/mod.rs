@@ -5,6 +5,7 @@ pub mod calibrate;
 pub mod cells;
 pub mod census;
 pub mod check;
+mod check_lazy;
 pub mod clustered;
 pub mod clusters;
 pub mod config;
@@ -14,6 +15,8 @@ pub mod expected;
 pub mod forest;
 pub mod grid;
 pub mod hybrid;
+pub mod instant;
+pub mod lazy;
 pub mod lbvh;
 pub mod median;
 pub mod method;
@@ -29,6 +32,7 @@ pub mod sample;
 pub mod small;
 pub mod structure;
 pub mod subtree;
+pub mod sweep;
 pub mod tree;
 
 use std::{sync::Arc, time::Instant};
@@ -171,6 +175,7 @@ struct Builder<'a> {
 impl Builder<'_> {
     fn structure(&mut self, recipe: Recipe) -> Result<Structure, Error> {
         let tree = match recipe {
+            Recipe::Lazy => return self.timed("cells", |this| instant::build(this.mesh, this.job)),
             Recipe::Hierarchy(hierarchy) => self.hierarchy(hierarchy)?,
             Recipe::Clustered => return self.clustered(),
             Recipe::Linear => return self.linear(),

@@ -79,12 +79,18 @@ pub fn sorted(mesh: &Mesh, job: &Job) -> Result<Arena<Key>, Error> {
     Ok(keys)
 }
 
+/// The key of a triangle whose box has its middle in `cube`.
+#[inline(always)]
+pub fn key(mesh: &Mesh, cube: &UnitCube, triangle: u32) -> Key {
+    let bounds = cube.bounds(mesh.corners(triangle));
+    let place = (bounds.lower + bounds.upper) * (BUCKETS / 2) as f32;
+    let [x, y, z] = place.to_array().map(|place| spread((place as u32).min(BUCKETS as u32 - 1)));
+    Key::new(x << 2 | y << 1 | z, triangle)
+}
+
 fn encode(mesh: &Mesh, cube: &UnitCube, solid: &[u32], keys: &mut [Key], histograms: &mut [Histogram; 3]) {
     for (key, &triangle) in keys.iter_mut().zip(solid) {
-        let bounds = cube.bounds(mesh.corners(triangle));
-        let place = (bounds.lower + bounds.upper) * (BUCKETS / 2) as f32;
-        let [x, y, z] = place.to_array().map(|place| spread((place as u32).min(BUCKETS as u32 - 1)));
-        *key = Key::new(x << 2 | y << 1 | z, triangle);
+        *key = self::key(mesh, cube, triangle);
         for (pass, histogram) in histograms.iter_mut().enumerate() {
             histogram[key.digit(pass as u32)] += 1;
         }

@@ -23,16 +23,8 @@ pub fn pack(tree: &Tree, mesh: &Mesh, job: &Job) -> Result<Structure, Error> {
     let mut packer = Packer { tree, mesh, job, centre: domain.centre, nodes, blocks };
     let packed = if tree.nodes.is_empty() { Packed::EMPTY } else { packer.subtree(0)? };
     let (nodes, blocks) = (packer.nodes, packer.blocks);
-    let mut structure = Structure {
-        root: packed.root,
-        domain,
-        nodes,
-        blocks,
-        grids: Vec::new(),
-        starts: Vec::new(),
-        references: Vec::new(),
-        stack_size: packed.stack_size,
-    };
+    let empty = Structure::of(packed.root, domain);
+    let mut structure = Structure { nodes, blocks, stack_size: packed.stack_size, ..empty };
     join_grids(tree, &mut structure)?;
     Ok(structure)
 }

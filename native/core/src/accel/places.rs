@@ -2,7 +2,10 @@
 
 use glam::Vec3;
 
-use super::structure::{Grid, Node, NodeRef, Structure, Target};
+use super::{
+    lazy::Refined,
+    structure::{Grid, Node, NodeRef, Structure, Target},
+};
 use crate::bounds::Bounds;
 
 /// A branch, leaf or grid within a structure.
@@ -12,6 +15,8 @@ pub struct Place {
     pub target: Target,
     /// Its box, relative to the centre of the domain.
     pub bounds: Bounds,
+    /// The lazy cell whose subtree it is in.
+    pub lazy: Option<u32>,
 }
 
 /// The places of all levels, from the root down; each level in the order of its parents. `bounds` is the scene's box,
@@ -19,25 +24,31 @@ pub struct Place {
 pub fn levels<'a>(structure: &'a Structure, bounds: &Bounds) -> impl Iterator<Item = Vec<Place>> + use<'a> {
     let centre = structure.domain.centre;
     let bounds = Bounds { lower: bounds.lower - centre, upper: bounds.upper - centre };
-    let root = place(structure.root, bounds).into_iter().collect();
+    let root = place(structure.root, bounds, None).into_iter().collect();
     let below = |level: &Vec<Place>| level.iter().flat_map(|place| children(structure, place)).collect();
     std::iter::successors(Some(root), move |level| Some(below(level)))
         .take_while(|level: &Vec<Place>| !level.is_empty())
 }
 
-fn place(reference: NodeRef, bounds: Bounds) -> Option<Place> {
+fn place(reference: NodeRef, bounds: Bounds, lazy: Option<u32>) -> Option<Place> {
     let target = reference.target();
-    (target != Target::Empty).then_some(Place { target, bounds })
+    (target != Target::Empty).then_some(Place { target, bounds, lazy })
 }
 
-/// The places right below one.
+/// The places right below one; below a lazy cell that has become a subtree, that one's root.
 pub fn children<'a>(structure: &'a Structure, place: &Place) -> impl Iterator<Item = Place> + use<'a> {
-    let node = match place.target {
-        Target::Branch(index) => Some(&structure.nodes[index as usize]),
-        _ => None,
+    let Place { target, bounds, lazy } = *place;
+    let refined = |cell: u32| structure.lazy.refined(cell as usize);
+    let view = lazy.and_then(refined).map_or(structure.view(), Refined::view);
+    let (node, root) = match target {
+        Target::Branch(index) => (Some(&view.nodes[index as usize]), None),
+        Target::Lazy(cell) => (None, refined(cell).map(|refined| (refined.root, cell))),
+        _ => (None, None),
     };
-    node.into_iter()
-        .flat_map(|node| (0..node.len()).filter_map(|lane| self::place(node.child[lane], node.bounds(lane))))
+    let below = node.into_iter().flat_map(move |node| {
+        (0..node.len()).filter_map(move |lane| self::place(node.child[lane], node.bounds(lane), lazy))
+    });
+    below.chain(root.and_then(|(root, cell)| self::place(root, bounds, Some(cell))))
 }
 
 impl Node {

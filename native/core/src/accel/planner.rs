@@ -33,6 +33,11 @@ impl<'r> Set<'r> {
     }
 
     /// Its records.
+    pub fn records(&self) -> &[Record] {
+        self.records
+    }
+
+    /// Its records, for as long as they live.
     pub fn into_records(self) -> &'r [Record] {
         self.records
     }

@@ -66,10 +66,20 @@ impl UnitCube {
         Self { lower: bounds.lower.into(), scale }
     }
 
+    /// What extents are multiplied by.
+    pub fn scale(&self) -> f32 {
+        self.scale
+    }
+
     /// The mapped box of a triangle.
     #[inline(always)]
     pub fn bounds(&self, corners: [Vec3; 3]) -> BoundsA {
-        let bounds = BoundsA::of_corners(corners);
+        self.mapped(&BoundsA::of_corners(corners))
+    }
+
+    /// A mapped box.
+    #[inline(always)]
+    pub fn mapped(&self, bounds: &BoundsA) -> BoundsA {
         let mapped = |point: Vec3A| (point - self.lower) * self.scale;
         BoundsA { lower: mapped(bounds.lower), upper: mapped(bounds.upper) }
     }

@@ -5,10 +5,11 @@ use super::{
     planner::Planner,
     record::{Record, UnitCube},
     structure::{Node, NodeRef},
+    sweep::{Item, Run, Sweep},
 };
 use crate::{
     Error, Mesh,
-    bounds::Bounds,
+    bounds::{Bounds, BoundsA},
     error,
     traverse::frame::Domain,
     triangle::{Block, LANES},
@@ -31,48 +32,88 @@ pub struct Subtree {
 }
 
 /// Builds one subtree after the other, in the same room.
-#[derive(Debug)]
-pub struct SmallBuilder<'a> {
-    mesh: &'a Mesh,
-    domain: Domain,
-    cube: UnitCube,
-    room: Room,
-}
-
-/// What a builder needs to remember things in.
 #[derive(Debug, Default)]
-struct Room {
+pub struct SmallBuilder {
     planner: Planner,
+    items: Vec<Item>,
+    sweep: Sweep,
     draft: Draft,
     boxes: Boxes,
 }
 
-impl<'a> SmallBuilder<'a> {
-    /// For subtrees of a structure over a mesh.
-    pub fn new(mesh: &'a Mesh) -> Self {
-        let bounds = mesh.bounds();
-        Self { mesh, domain: Domain::new(&bounds), cube: UnitCube::new(&bounds), room: Room::default() }
-    }
-
-    /// Build over some triangles, none of them without area, by the surface area heuristic. Depends on nothing but their
-    /// order. Meant for dozens, right for any number.
+impl SmallBuilder {
+    /// Build over some triangles of a mesh, none of them without area, by the surface area heuristic. Depends on nothing
+    /// but their order. Meant for dozens, right for any number.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`].
-    pub fn build(&mut self, triangles: &[u32]) -> Result<Subtree, Error> {
-        let Room { planner, draft, boxes } = &mut self.room;
+    pub fn build(&mut self, mesh: &Mesh, triangles: &[u32]) -> Result<Subtree, Error> {
+        let Self { planner, draft, .. } = self;
+        let cube = UnitCube::new(&mesh.bounds());
         draft.clear();
         if !triangles.is_empty() {
-            let record = |(index, &triangle): (usize, &u32)| {
-                Record::new(&self.cube.bounds(self.mesh.corners(triangle)), index as u32, 1)
-            };
+            let record =
+                |(index, &triangle): (usize, &u32)| Record::new(&cube.bounds(mesh.corners(triangle)), index as u32, 1);
             planner.plan(triangles.iter().enumerate().map(record), triangles, LANES, draft);
         }
+        self.write(mesh)
+    }
+
+    /// Build over some triangles that stand in order along a curve, and keep them in it: in a fraction of the time, for
+    /// subtrees that take a little longer to trace.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`].
+    pub fn build_in_order(&mut self, mesh: &Mesh, triangles: &[u32]) -> Result<Subtree, Error> {
+        let Self { items, draft, sweep, .. } = self;
+        let item = |&triangle| Item { bounds: BoundsA::of_corners(mesh.corners(triangle)), count: 1 };
+        items.clear();
+        items.extend(triangles.iter().map(item));
+        draft.clear();
+        if !triangles.is_empty() {
+            let scale = UnitCube::new(&mesh.bounds()).scale();
+            let all = Run::new(items, 0..items.len());
+            let (root, stack_size) = InOrder { triangles, items, scale, sweep, draft }.subtree(all);
+            (draft.root, draft.stack_size) = (root, stack_size);
+        }
+        self.write(mesh)
+    }
+
+    fn write(&mut self, mesh: &Mesh) -> Result<Subtree, Error> {
+        let Self { draft, boxes, .. } = self;
+        let domain = Domain::new(&mesh.bounds());
         let mut nodes = error::filled(draft.nodes.len(), Node::EMPTY, "the nodes of a subtree")?;
         let mut blocks = error::filled(draft.leaves.len(), Block::EMPTY, "the leaves of a subtree")?;
         let mut site = Site { nodes: &mut nodes, blocks: &mut blocks, first_node: 0, first_block: 0 };
-        let bounds = draft::fit(draft, self.mesh, self.domain.centre.into(), &mut site, boxes).into();
+        let bounds = draft::fit(draft, mesh, domain.centre.into(), &mut site, boxes).into();
         Ok(Subtree { root: draft.root, nodes, blocks, stack_size: draft.stack_size, bounds })
+    }
+}
+
+struct InOrder<'a> {
+    triangles: &'a [u32],
+    items: &'a [Item],
+    scale: f32,
+    sweep: &'a mut Sweep,
+    draft: &'a mut Draft,
+}
+
+impl InOrder<'_> {
+    /// Returns where it is, and the entries a traversal needs on its stack.
+    fn subtree(&mut self, run: Run) -> (NodeRef, usize) {
+        if run.count() <= LANES {
+            return (self.draft.push_leaf(self.triangles[run.items].iter().copied()), 0);
+        }
+        let slot = self.draft.nodes.len();
+        self.draft.nodes.push([NodeRef::EMPTY; LANES]);
+        let (mut count, mut deepest) = (0, 0);
+        for run in self.sweep.open(self.items, run, LANES, self.scale) {
+            let (child, below) = self.subtree(run);
+            self.draft.nodes[slot][count] = child;
+            count += 1;
+            deepest = deepest.max(below);
+        }
+        (NodeRef::branch(slot), count - 1 + deepest)
     }
 }
 
@@ -101,18 +142,11 @@ mod tests {
         for count in [0, 1, 8, 9, 64, 65, 3000] {
             let mesh = mesh(count);
             let Subtree { root, nodes, blocks, stack_size, bounds } =
-                SmallBuilder::new(&mesh).build(mesh.solid()).unwrap();
+                SmallBuilder::default().build(&mesh, mesh.solid()).unwrap();
             assert_eq!(bounds, mesh.bounds());
-            let structure = Structure {
-                root,
-                domain: Domain::new(&mesh.bounds()),
-                nodes: arena(&nodes),
-                blocks: arena(&blocks),
-                grids: Vec::new(),
-                starts: Vec::new(),
-                references: Vec::new(),
-                stack_size,
-            };
+            let (nodes, blocks) = (arena(&nodes), arena(&blocks));
+            let empty = Structure::of(root, Domain::new(&mesh.bounds()));
+            let structure = Structure { nodes, blocks, stack_size, ..empty };
             assert_well_formed(&structure, &mesh);
         }
     }

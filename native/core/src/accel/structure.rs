@@ -4,6 +4,7 @@
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3A;
 
+use super::lazy::LazyCells;
 use crate::{
     arena::Arena,
     bounds::BoundsA,
@@ -30,6 +31,8 @@ pub enum Target {
     },
     /// Index into [`Structure::grids`].
     Grid(u32),
+    /// Index into [`Structure::lazy`].
+    Lazy(u32),
     /// Nothing.
     Empty,
 }
@@ -37,6 +40,8 @@ pub enum Target {
 impl NodeRef {
     const TAG: u32 = 30;
     const COUNT: u32 = 27;
+    /// Stands where a leaf has its count.
+    const LAZY: u32 = 1;
     /// Indices are below this; [`crate::Mesh`] bounds the number of triangles by it, and every builder makes at most
     /// one block or node a triangle.
     const INDEX: u32 = (1 << Self::COUNT) - 1;
@@ -62,13 +67,19 @@ impl NodeRef {
         Self(2 << Self::TAG | index as u32)
     }
 
+    /// A cell that becomes a subtree when a ray reaches it.
+    pub fn lazy(index: usize) -> Self {
+        assert!(index <= Self::INDEX as usize);
+        Self(3 << Self::TAG | Self::LAZY << Self::COUNT | index as u32)
+    }
+
     /// The same child where the nodes and blocks of its subtree stand so many places farther on.
     #[inline(always)]
     pub fn moved(self, nodes: usize, blocks: usize) -> Self {
         match self.target() {
             Target::Branch(index) => Self::branch(index as usize + nodes),
             Target::Leaf { block, count } => Self::leaf(block as usize + blocks, count as usize),
-            Target::Grid(_) | Target::Empty => self,
+            _ => self,
         }
     }
 
@@ -79,7 +90,8 @@ impl NodeRef {
             0 => Target::Branch(self.0),
             1 => Target::Leaf { block: self.0 & Self::INDEX, count: (self.0 >> Self::COUNT & 7) + 1 },
             2 => Target::Grid(self.0 & Self::INDEX),
-            _ => Target::Empty,
+            _ if self == Self::EMPTY => Target::Empty,
+            _ => Target::Lazy(self.0 & Self::INDEX),
         }
     }
 }
@@ -221,11 +233,48 @@ pub struct Structure {
     pub starts: Vec<u32>,
     /// Triangles of all grid cells.
     pub references: Vec<u32>,
+    /// Cells that become subtrees when a ray reaches them.
+    pub lazy: LazyCells,
     /// No traversal holds more entries on its stack.
     pub stack_size: usize,
 }
 
+/// The nodes and blocks that the references within a part of a structure mean: its own, or those of a lazy cell.
+#[derive(Debug, Clone, Copy)]
+pub struct View<'a> {
+    /// What [`Target::Branch`] means.
+    pub nodes: &'a [Node],
+    /// What [`Target::Leaf`] means.
+    pub blocks: &'a [Block],
+}
+
 impl Structure {
+    /// Nothing but a root.
+    pub fn of(root: NodeRef, domain: Domain) -> Self {
+        Self {
+            root,
+            domain,
+            nodes: Arena::empty(),
+            blocks: Arena::empty(),
+            grids: Vec::new(),
+            starts: Vec::new(),
+            references: Vec::new(),
+            lazy: LazyCells::default(),
+            stack_size: 0,
+        }
+    }
+
+    /// Its own nodes and blocks.
+    #[inline(always)]
+    pub fn view(&self) -> View<'_> {
+        View { nodes: &self.nodes, blocks: &self.blocks }
+    }
+
+    /// Whether rays may meet anything but branches and leaves.
+    pub fn has_grids(&self) -> bool {
+        !self.grids.is_empty() || !self.lazy.is_empty()
+    }
+
     /// The triangles in a cell of a grid.
     #[inline(always)]
     pub fn cell(&self, grid: &Grid, index: usize) -> &[u32] {
@@ -241,5 +290,6 @@ impl Structure {
             + size_of_val(&*self.grids)
             + size_of_val(&*self.starts)
             + size_of_val(&*self.references)
+            + self.lazy.bytes()
     }
 }

@@ -130,9 +130,9 @@ struct Streams<'a, F, const ANY: bool> {
 /// The table that picks a loop's instance, once a batch.
 macro_rules! pick_instance {
     ($batch:ident, $simd:ident) => {
-        match $batch.tracer.structure.grids.is_empty() {
-            true => $batch.each::<S, false>($simd),
-            false => $batch.each::<S, true>($simd),
+        match $batch.tracer.structure.has_grids() {
+            false => $batch.each::<S, false>($simd),
+            true => $batch.each::<S, true>($simd),
         }
     };
 }

@@ -28,7 +28,7 @@ pub fn walk<S: Simd, P: Probe, const ANY: bool>(
     structure: &Structure,
     grid: &Grid,
 ) -> bool {
-    let Some(enter) = enter(search.frame, grid, search.best.high) else {
+    let Some(enter) = search.frame.enter(&grid.lower, &grid.upper, search.best.high) else {
         return false;
     };
     let frame = search.frame;
@@ -44,19 +44,6 @@ pub fn walk<S: Simd, P: Probe, const ANY: bool>(
             return false;
         }
     }
-}
-
-/// Where the ray enters the dilated box of a grid, if it does before `limit`.
-#[inline(always)]
-fn enter(frame: &Frame, grid: &Grid, limit: f32) -> Option<f32> {
-    let (mut near, mut far) = (frame.tmin, limit);
-    for k in 0..3 {
-        let (first, last) =
-            if frame.inverse[k] < 0.0 { (grid.upper[k], grid.lower[k]) } else { (grid.lower[k], grid.upper[k]) };
-        near = near.max(first * frame.inverse[k] + frame.near_bias[k]);
-        far = far.min(last * frame.inverse[k] + frame.far_bias[k]);
-    }
-    (near <= far).then_some(near)
 }
 
 impl Walk {

@@ -152,6 +152,18 @@ impl Frame {
         Self { scale, advance, ..Self::near(origin, local, reach, direction, interval, domain) }
     }
 
+    /// Where the ray enters a dilated box, given relative to the centre of the domain, if it does before `limit`.
+    #[inline(always)]
+    pub fn enter(&self, lower: &[f32; 3], upper: &[f32; 3], limit: f32) -> Option<f32> {
+        let (mut near, mut far) = (self.tmin, limit);
+        for k in 0..3 {
+            let (first, last) = if self.inverse[k] < 0.0 { (upper[k], lower[k]) } else { (lower[k], upper[k]) };
+            near = near.max(first * self.inverse[k] + self.near_bias[k]);
+            far = far.min(last * self.inverse[k] + self.far_bias[k]);
+        }
+        (near <= far).then_some(near)
+    }
+
     /// The signs of the direction: bit `k` is set where it falls along axis `k`.
     #[inline]
     pub fn octant(&self) -> usize {

@@ -9,9 +9,9 @@ use super::{
 };
 use crate::{
     Mesh,
-    accel::structure::{Node, NodeRef, Structure, Target},
+    accel::structure::{Node, NodeRef, Structure, Target, View},
     simd::Simd,
-    triangle::{Block, LANES},
+    triangle::LANES,
 };
 
 /// A subtree to visit, and where the ray enters it.
@@ -77,28 +77,29 @@ pub fn trace<S: Simd, P: Probe, const GRIDS: bool, const ANY: bool>(
     probe: &mut P,
 ) -> Best {
     let mut search = Search { simd, frame, mesh, probe, best: Best::none(frame.tmax) };
-    trace_below::<S, P, GRIDS, ANY>(&mut search, structure, structure.root, stack);
+    trace_below::<S, P, GRIDS, ANY>(&mut search, structure, (structure.view(), structure.root), stack);
     search.best
 }
 
-/// Go on with a search below `node`.
+/// Go on with a search below a node, which is one of those that `view` shows.
 #[inline(always)]
 pub fn trace_below<S: Simd, P: Probe, const GRIDS: bool, const ANY: bool>(
     search: &mut Search<'_, S, P>,
     structure: &Structure,
-    node: NodeRef,
+    (view, node): (View<'_>, NodeRef),
     stack: &mut [Entry],
 ) {
     let simd = search.simd;
     let planes = Planes::new(simd, search.frame);
-    let (nodes, blocks): (&[Node], &[Block]) = (&structure.nodes, &structure.blocks);
+    // What lies on the stack from `floor` up is in the lazy cell that the search is in.
+    let (mut here, mut floor) = (view, 0);
     let mut depth = 0;
     let mut current = node;
     loop {
         let found = match current.target() {
             Target::Branch(index) => {
                 search.probe.step();
-                let node = &nodes[index as usize];
+                let node = &here.nodes[index as usize];
                 let (met, near) = planes.meet(simd, node, search.best.high);
                 if met != 0 {
                     current = descend(node, met, &near, stack, &mut depth);
@@ -106,17 +107,27 @@ pub fn trace_below<S: Simd, P: Probe, const GRIDS: bool, const ANY: bool>(
                 }
                 false
             }
-            Target::Leaf { block, count } => search.block::<ANY>(&blocks[block as usize], count),
+            Target::Leaf { block, count } => search.block::<ANY>(&here.blocks[block as usize], count),
             Target::Grid(index) if GRIDS => dda::walk::<S, P, ANY>(search, structure, &structure.grids[index as usize]),
-            Target::Grid(_) | Target::Empty => false,
+            Target::Lazy(index) if GRIDS => match structure.lazy.refine(index as usize, search.mesh) {
+                Some(cell) => {
+                    (here, floor, current) = (cell.view(), depth, cell.root);
+                    continue;
+                }
+                None => search.gather::<ANY>(structure.lazy.triangles(index as usize)),
+            },
+            _ => false,
         };
         if ANY && found {
             return;
         }
-        match pop(stack, &mut depth, search.best.high) {
-            Some(node) => current = node,
-            None => return,
-        }
+        current = loop {
+            match pop(stack, &mut depth, floor, search.best.high) {
+                Some(node) => break node,
+                None if GRIDS && depth > 0 => (here, floor) = (view, 0),
+                None => return,
+            }
+        };
     }
 }
 
@@ -143,10 +154,10 @@ fn push(stack: &mut [Entry], depth: &mut usize, entry: Entry) {
     *depth += 1;
 }
 
-/// The last entry that the ray still reaches before `limit`.
+/// The last entry from `floor` up that the ray still reaches before `limit`.
 #[inline(always)]
-fn pop(stack: &[Entry], depth: &mut usize, limit: f32) -> Option<NodeRef> {
-    while *depth > 0 {
+fn pop(stack: &[Entry], depth: &mut usize, floor: usize, limit: f32) -> Option<NodeRef> {
+    while *depth > floor {
         *depth -= 1;
         let entry = stack[*depth];
         if entry.near <= limit {

@@ -14,7 +14,7 @@ use super::{
 };
 use crate::{
     Mesh,
-    accel::structure::{Node, NodeRef, Structure, Target},
+    accel::structure::{Node, NodeRef, Structure, Target, View},
     ray::MISS,
     simd::{GROUP, Simd},
     triangle::{Block, LANES},
@@ -94,25 +94,44 @@ pub fn trace<S: Simd, const GRIDS: bool, const ANY: bool>(
     if bin.frames.is_empty() {
         return;
     }
-    let (nodes, blocks): (&[Node], &[Block]) = (&structure.nodes, &structure.blocks);
     lists.begin(structure.root, bin.frames.len());
-    while let Some(visit) = lists.visits.pop() {
+    // Visits from `floor` up are in the lazy cell that the rays are in.
+    let (mut here, mut floor) = (structure.view(), 0);
+    loop {
+        if GRIDS && lists.visits.len() == floor {
+            (here, floor) = (structure.view(), 0);
+        }
+        let Some(visit) = lists.visits.pop() else { return };
         let ids = visit.start as usize..(visit.start + visit.count) as usize;
-        match visit.node.target() {
+        let mut node = visit.node;
+        if GRIDS
+            && let Target::Lazy(cell) = node.target()
+            && ids.len() >= FEW
+        {
+            let mut rays = lists.ids[ids.clone()].iter().map(|&id| &bin.frames[id as usize]);
+            // Many a ray has ended since it met the cell: none of them is to refine what nobody sees.
+            if !rays.any(|frame| structure.lazy.is_met(cell as usize, frame)) {
+                continue;
+            }
+            if let Some(cell) = structure.lazy.refine(cell as usize, mesh) {
+                (here, floor, node) = (cell.view(), lists.visits.len(), cell.root);
+            }
+        }
+        match node.target() {
             Target::Branch(index) if ids.len() >= FEW => {
-                branch(simd, &nodes[index as usize], octant, ids, &bin.frames, lists);
+                branch(simd, &here.nodes[index as usize], octant, ids, &bin.frames, lists);
             }
             Target::Leaf { block, count } => {
-                let block = &blocks[block as usize];
+                let block = &here.blocks[block as usize];
                 for &id in &lists.ids[ids] {
                     let ray = Single { frame: &mut bin.frames[id as usize], best: &mut bin.hits[id as usize] };
                     ray.block::<S, ANY>(simd, mesh, block, count);
                 }
             }
-            Target::Branch(_) | Target::Grid(_) | Target::Empty => {
+            _ => {
                 for &id in &lists.ids[ids] {
                     let ray = Single { frame: &mut bin.frames[id as usize], best: &mut bin.hits[id as usize] };
-                    ray.trace::<S, GRIDS, ANY>(simd, structure, mesh, visit.node, stack);
+                    ray.trace::<S, GRIDS, ANY>(simd, structure, mesh, (here, node), stack);
                 }
             }
         }
@@ -222,14 +241,14 @@ impl Single<'_> {
         self.keep::<ANY>(best);
     }
 
-    /// Go on alone below `node`.
+    /// Go on alone below a node.
     #[inline(always)]
     fn trace<S: Simd, const GRIDS: bool, const ANY: bool>(
         self,
         simd: S,
         structure: &Structure,
         mesh: &Mesh,
-        node: NodeRef,
+        node: (View<'_>, NodeRef),
         stack: &mut [kernel::Entry],
     ) {
         if self.frame.tmin > self.frame.tmax {
