@@ -17,7 +17,7 @@ from typing import Any, NoReturn
 from . import catalogue, input_kinds, native
 from .arguments import UsageError, count, resolution, some_of
 from .images import write_png
-from .methods import METHOD_NAMES
+from .methods import COMPARED_METHODS, METHOD_NAMES
 from .outputs import OutputFolder
 from .study import command as study_command
 from .terminal import ProgressLine, own_streams
@@ -66,7 +66,7 @@ def _parser() -> argparse.ArgumentParser:
     compare.add_argument("input", metavar="INPUT", help="a .blend, a mesh (.ply .obj .stl .glb), or a scene's name")
     known = ",".join(METHOD_NAMES)
     methods = some_of("method", METHOD_NAMES)
-    compare.add_argument("--methods", type=methods, default=METHOD_NAMES, help=f"some of {known}")
+    compare.add_argument("--methods", type=methods, default=COMPARED_METHODS, help=f"some of {known}")
     compare.add_argument("--resolution", type=resolution, metavar="WxH", help="a .blend's own, else 1000x1000")
     compare.add_argument("--samples", type=count(1, 1 << 20), default=1, metavar="N", help="rays a pixel (1)")
     compare.add_argument("--threads", type=count(0, 1024), default=0, metavar="N", help="0, the default: all cores")

@@ -23,7 +23,7 @@ from .cycles import Job, SecondBlender, command
 from .difference import flip, rmse
 from .errors import CancelledError, ComparisonSaveError
 from .images import Picture
-from .methods import METHOD_NAMES
+from .methods import COMPARED_METHODS
 from .report import DifferenceSummary, ImageSummary, MethodSummary, Report, SceneSummary
 from .run import MethodResult, Options, Run
 from .scene_data import Float32, SceneData
@@ -38,7 +38,7 @@ CENSUS_COUNTS = ("bytes", "nodes", "leaves", "grids", "cells", "empty_cells", "r
 class Settings:
     """What is compared. options.threads 0: all cores. resolution (width, height) in pixels, None: the scene's."""
 
-    methods: Sequence[str] = METHOD_NAMES
+    methods: Sequence[str] = COMPARED_METHODS
     options: Options = field(default_factory=Options)
     resolution: tuple[int, int] | None = None
     cycles: bool = True

@@ -27,6 +27,21 @@ METHODS: tuple[Method, ...] = (
     ),
     Method("lbvh", "Linear BVH", "Bounding volume hierarchy along a space-filling curve: the fastest to build"),
     Method("grid", "Uniform Grid", "One uniform grid of cells over the whole scene"),
+    Method("grid-two-level", "Two-Level Grid", "A coarse grid whose cells are grids, each as fine as its triangles ask for"),
+    Method("grid-irregular", "Irregular Grid", "A grid whose cells are merged where that is cheaper, to cross space fast"),
+    Method(
+        "grid-tetrahedral", "Tetrahedral Grid", "As many tetrahedra of equal volume as the uniform grid has cells"
+    ),
+    Method(
+        "hapala",
+        "Tested Grid",
+        "A uniform grid that is tested with sample rays, and replaced by a hierarchy where the rays to come pay for it",
+    ),
+    Method(
+        "fellner",
+        "Nested (Cost)",
+        "Hierarchy whose nodes become grids, and their cells hierarchies or grids again, by ratios of surface areas",
+    ),
     Method(
         "hybrid-sampled",
         "Hybrid (Sampled)",
@@ -43,6 +58,9 @@ METHODS: tuple[Method, ...] = (
         "A uniform grid divides the scene, and what is in a cell becomes a hierarchy when the first ray reaches it",
     ),
 )
+
+COMPARED_METHODS = ("bvh-median", "bvh-sah", "grid", "hybrid-sampled", "hybrid-cost")
+"""What is compared where nobody chooses: the paper's methods, and those that answer it."""
 
 METHOD_NAMES: tuple[str, ...] = tuple(method.name for method in METHODS)
 DEFAULT_METHOD = "hybrid-sampled"

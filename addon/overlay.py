@@ -13,7 +13,19 @@ from mathutils import Matrix
 
 from . import session
 from .areas import redraw
-from .overlay_boxes import BRANCH, CELL, GRID, LAZY, LEAF, REFINED, Filter, Lines, box_lines, select
+from .overlay_boxes import (
+    BRANCH,
+    CELL,
+    GRID,
+    LAZY,
+    LEAF,
+    REFINED,
+    TETRAHEDRON,
+    Filter,
+    Lines,
+    box_lines,
+    select,
+)
 
 FETCH_LIMIT = 1 << 21
 """Most boxes asked of the native core, before those that are not wanted are left out: 62 MB while batches are built."""
@@ -24,6 +36,7 @@ DEPTH_BIAS = 3e-6
 TOGGLES = {BRANCH: ("branches", "branch_color"), LEAF: ("leaves", "leaf_color")}
 TOGGLES |= {GRID: ("grids", "grid_color"), CELL: ("cells", "cell_color")}
 TOGGLES |= {LAZY: ("leaves", "leaf_color"), REFINED: ("branches", "branch_color")}
+TOGGLES |= {TETRAHEDRON: TOGGLES[CELL]}
 """Names of the setting that shows a kind of box, and of its colour, in the order they are drawn."""
 
 

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 Float32 = NDArray[np.float32]
 UInt32 = NDArray[np.uint32]
 
-BRANCH, LEAF, GRID, CELL = range(4)
-LAZY, REFINED = 5, 6
+BRANCH, LEAF, GRID, CELL, TETRAHEDRON, LAZY, REFINED = range(7)
 """Values of `Cells.kind`."""
 
 CORNERS = np.array([[x, y, z] for z in (0, 1) for y in (0, 1) for x in (0, 1)], dtype=np.bool_)

@@ -13,7 +13,7 @@ from bpy.props import (
 )
 
 from .areas import redraw
-from .methods import DEFAULT_METHOD, METHOD_NAMES, METHODS
+from .methods import COMPARED_METHODS, DEFAULT_METHOD, METHODS
 
 METHOD_ITEMS = [(method.name, method.label, method.description, index) for index, method in enumerate(METHODS)]
 METHOD_FLAGS = [(method.name, method.label, method.description, 1 << index) for index, method in enumerate(METHODS)]
@@ -128,7 +128,7 @@ class ESPALIER_PG_settings(bpy.types.PropertyGroup):
         name="Methods",
         description="Acceleration methods to build, trace and compare",
         items=METHOD_FLAGS,
-        default=set(METHOD_NAMES),
+        default=set(COMPARED_METHODS),
         options={"ENUM_FLAG"},
     )
     samples: IntProperty(

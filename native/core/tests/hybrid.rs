@@ -13,6 +13,7 @@ use espalier_core::{
     accel::{
         check::assert_well_formed,
         decision::{Decision, Verdict},
+        lattice::Lattices,
     },
 };
 
@@ -97,9 +98,10 @@ fn every_grid_was_decided_on() {
 fn other_methods_decide_nothing_and_small_meshes_tell_why() {
     let mesh = mesh(icosphere(0));
     for accelerator in build_all(&mesh) {
-        let expected = usize::from(HYBRIDS.contains(&accelerator.method()));
-        assert_eq!(accelerator.decisions().len(), expected);
-        assert!(accelerator.decisions().iter().all(|decision| decision.rays == 0));
+        let decides = |method| matches!(method, Method::Hapala | Method::Fellner) || HYBRIDS.contains(&method);
+        assert_eq!(accelerator.decisions().len(), usize::from(decides(accelerator.method())));
+        let is_sampled = accelerator.method() == Method::Hapala;
+        assert!(accelerator.decisions().iter().all(|decision| (decision.rays > 0) == is_sampled));
     }
 }
 
@@ -115,6 +117,9 @@ fn fingerprint(accelerator: &Accelerator) -> u64 {
         block.primitive.hash(&mut hasher);
     }
     (&structure.starts, &structure.references, structure.stack_size).hash(&mut hasher);
+    let Lattices { nests, children, tetrahedral, irregular, voxels, merged } = &structure.lattices;
+    (voxels, merged).hash(&mut hasher);
+    format!("{nests:?} {children:?} {tetrahedral:?} {irregular:?}").hash(&mut hasher);
     format!("{:?} {:?} {:?}", structure.root, structure.grids, accelerator.decisions()).hash(&mut hasher);
     hasher.finish()
 }
@@ -123,7 +128,7 @@ fn fingerprint(accelerator: &Accelerator) -> u64 {
 fn builds_do_not_depend_on_the_number_of_threads() {
     let mesh = mesh(soup(20_000, 0.03));
     for method in Method::ALL {
-        for config in [Config::default(), eager()] {
+        for config in [Config::default(), eager(), nested()] {
             let one = fingerprint(&build(&mesh, method, &config, 1));
             for threads in [2, 3] {
                 let same = one == fingerprint(&build(&mesh, method, &config, threads));

@@ -2,7 +2,7 @@
 
 use espalier_core::{
     Config, Method,
-    accel::method::{Hierarchy, Judgement, Recipe},
+    accel::method::{Hierarchy, Judgement, Lattice, Recipe},
 };
 use pyo3::{
     prelude::*,
@@ -26,9 +26,12 @@ enum Readers {
     All,
     Sah,
     Grids,
-    Hybrids,
+    Samples,
+    Window,
     Sampled,
+    Gain,
     Cost,
+    Recipe(Recipe),
 }
 
 impl Readers {
@@ -36,11 +39,20 @@ impl Readers {
         let recipe = method.recipe();
         match self {
             Self::All => true,
-            Self::Sah => recipe == Recipe::Hierarchy(Hierarchy::Sah),
-            Self::Grids => matches!(recipe, Recipe::Grid | Recipe::Hybrid(_)),
-            Self::Hybrids => matches!(recipe, Recipe::Hybrid(_)),
+            Self::Sah => matches!(recipe, Recipe::Hierarchy(Hierarchy::Sah) | Recipe::Hapala | Recipe::Fellner),
+            Self::Grids => !matches!(recipe, Recipe::Hierarchy(_)),
+            Self::Samples => matches!(recipe, Recipe::Hybrid(_) | Recipe::Hapala),
+            Self::Window => matches!(recipe, Recipe::Hybrid(_) | Recipe::Fellner),
             Self::Sampled => recipe == Recipe::Hybrid(Judgement::Sampled),
-            Self::Cost => recipe == Recipe::Hybrid(Judgement::ExpectedCost),
+            Self::Gain => matches!(recipe, Recipe::Hybrid(Judgement::ExpectedCost) | Recipe::Fellner),
+            Self::Cost => matches!(
+                recipe,
+                Recipe::Hybrid(Judgement::ExpectedCost)
+                    | Recipe::Lattice(Lattice::Irregular)
+                    | Recipe::Hapala
+                    | Recipe::Fellner
+            ),
+            Self::Recipe(wanted) => recipe == wanted,
         }
     }
 }
@@ -68,14 +80,22 @@ const FIELDS: &[(&str, Readers, Field)] = &[
     ("sah_bins", Readers::Sah, whole!(sah_bins)),
     ("grid_density", Readers::Grids, real!(grid_density)),
     ("grid_most_cells", Readers::Grids, whole!(grid_most_cells)),
-    ("sample_rays", Readers::Hybrids, real!(sample_rays)),
-    ("sample_least", Readers::Hybrids, whole!(sample_least)),
-    ("sample_most", Readers::Hybrids, whole!(sample_most)),
+    ("coarse_density", Readers::Recipe(Recipe::Lattice(Lattice::TwoLevel)), real!(coarse_density)),
+    ("fine_density", Readers::Recipe(Recipe::Lattice(Lattice::TwoLevel)), real!(fine_density)),
+    ("expansions", Readers::Recipe(Recipe::Lattice(Lattice::Irregular)), whole!(expansions)),
+    ("nesting", Readers::Recipe(Recipe::Fellner), whole!(nesting)),
+    ("hierarchy_nodes", Readers::Recipe(Recipe::Hapala), real!(hierarchy_nodes)),
+    ("hierarchy_block_nodes", Readers::Recipe(Recipe::Hapala), real!(hierarchy_block_nodes)),
+    ("hierarchy_blocks", Readers::Recipe(Recipe::Hapala), real!(hierarchy_blocks)),
+    ("hierarchy_build", Readers::Recipe(Recipe::Hapala), real!(hierarchy_build)),
+    ("sample_rays", Readers::Samples, real!(sample_rays)),
+    ("sample_least", Readers::Samples, whole!(sample_least)),
+    ("sample_most", Readers::Samples, whole!(sample_most)),
     ("hit_threshold", Readers::Sampled, real!(hit_threshold)),
     ("spread_threshold", Readers::Sampled, real!(spread_threshold)),
-    ("grid_least_triangles", Readers::Hybrids, whole!(grid_least_triangles)),
-    ("grid_most_triangles", Readers::Hybrids, whole!(grid_most_triangles)),
-    ("grid_gain", Readers::Cost, real!(grid_gain)),
+    ("grid_least_triangles", Readers::Window, whole!(grid_least_triangles)),
+    ("grid_most_triangles", Readers::Window, whole!(grid_most_triangles)),
+    ("grid_gain", Readers::Gain, real!(grid_gain)),
     ("node_ns", Readers::Cost, real!(cost.node_ns)),
     ("block_ns", Readers::Cost, real!(cost.block_ns)),
     ("cell_ns", Readers::Cost, real!(cost.cell_ns)),

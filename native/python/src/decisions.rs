@@ -15,6 +15,7 @@ pub fn to_dict<'py>(py: Python<'py>, decisions: &[Decision]) -> PyResult<Bound<'
     dict.set_item("primitives", column(py, decisions, |d| d.primitives)?)?;
     dict.set_item("rays", column(py, decisions, |d| d.rays)?)?;
     dict.set_item("hits", column(py, decisions, |d| d.hits)?)?;
+    dict.set_item("sparseness", column(py, decisions, |d| d.sparseness)?)?;
     dict.set_item("spread", column(py, decisions, |d| d.spread)?)?;
     dict.set_item("hit_threshold", column(py, decisions, |d| d.hit_threshold)?)?;
     dict.set_item("spread_threshold", column(py, decisions, |d| d.spread_threshold)?)?;

@@ -3,8 +3,9 @@
 use glam::Vec3;
 
 use super::{
+    content,
     places::{Place, children, levels},
-    structure::{Grid, Structure, Target},
+    structure::{Structure, Target},
 };
 use crate::{Error, bounds::Bounds, error};
 
@@ -18,8 +19,10 @@ pub enum CellKind {
     Leaf = 1,
     /// A whole grid.
     Grid = 2,
-    /// One cell of a grid.
+    /// One cell of a grid that holds no node.
     GridCell = 3,
+    /// The box of one tetrahedron of a grid of those.
+    Tetrahedron = 4,
     /// A lazy cell that no ray has reached.
     Lazy = 5,
     /// A lazy cell that has become a subtree.
@@ -62,9 +65,8 @@ impl Cells {
     /// # Errors
     /// [`Error::OutOfMemory`].
     pub fn of(structure: &Structure, bounds: &Bounds, filter: &CellFilter) -> Result<Self, Error> {
-        let cells: usize = structure.grids.iter().map(Grid::cell_count).sum();
-        let places = structure.nodes.len() + structure.blocks.len() + structure.grids.len();
-        let all = places + structure.lazy.places() + cells;
+        let places = structure.nodes.len() + structure.blocks.len() + structure.lazy.places();
+        let all = places + content::most_boxes(structure);
         let most = filter.max_count.unwrap_or(usize::MAX);
         let mut list =
             Lister { structure, filter, most, totals: totals(structure), cells: Self::reserve(all.min(most))? };
@@ -121,18 +123,14 @@ impl Lister<'_> {
                 }
             }
         }
-        above.iter().all(|place| match place.target {
-            Target::Grid(index) => self.grid_cells(index as usize, depth),
-            _ => true,
-        })
+        above.iter().all(|place| self.grid_cells(place.target, depth))
     }
 
-    fn grid_cells(&mut self, index: usize, depth: usize) -> bool {
-        let grid = &self.structure.grids[index];
-        (0..grid.cell_count()).all(|cell| {
-            let count = self.structure.cell(grid, cell).len() as u32;
-            let skipped = count == 0 && self.filter.occupied_only;
-            skipped || self.push(&grid.cell_bounds(cell), CellKind::GridCell, depth, count)
+    fn grid_cells(&mut self, target: Target, depth: usize) -> bool {
+        let kind = if matches!(target, Target::Tetrahedral(_)) { CellKind::Tetrahedron } else { CellKind::GridCell };
+        content::cells(self.structure, target).all(|cell| {
+            let skipped = cell.count == 0 && self.filter.occupied_only;
+            skipped || self.push(&cell.bounds, kind, depth, cell.count as u32)
         })
     }
 
@@ -164,10 +162,10 @@ fn kind(structure: &Structure, target: Target) -> Option<CellKind> {
     match target {
         Target::Branch(_) => Some(CellKind::Branch),
         Target::Leaf { .. } => Some(CellKind::Leaf),
-        Target::Grid(_) => Some(CellKind::Grid),
         Target::Lazy(cell) if structure.lazy.refined(cell as usize).is_some() => Some(CellKind::Refined),
         Target::Lazy(_) => Some(CellKind::Lazy),
         Target::Empty => None,
+        _ => Some(CellKind::Grid),
     }
 }
 
@@ -186,11 +184,11 @@ fn references(structure: &Structure, totals: &[u32], target: Target) -> u32 {
     match target {
         Target::Branch(index) => totals[index as usize],
         Target::Leaf { count, .. } => count,
-        Target::Grid(index) => {
-            let grid = &structure.grids[index as usize];
-            structure.starts[grid.first + grid.cell_count()] - structure.starts[grid.first]
+        Target::Nest(index) => {
+            let children = structure.lattices.children(&structure.lattices.nests[index as usize]);
+            children.iter().map(|child| references(structure, totals, child.target())).fold(0, u32::saturating_add)
         }
         Target::Lazy(cell) => structure.lazy.triangles(cell as usize).len() as u32,
-        Target::Empty => 0,
+        _ => content::cells(structure, target).map(|cell| cell.count as u32).fold(0, u32::saturating_add),
     }
 }

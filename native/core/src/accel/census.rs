@@ -2,8 +2,9 @@
 
 use super::{
     config::CostConstants,
-    places::{Place, levels},
-    structure::{Grid, Structure, Target},
+    content,
+    places::{self, Place, levels},
+    structure::{Structure, Target},
 };
 use crate::{bounds::Bounds, triangle::LANES};
 
@@ -14,9 +15,9 @@ pub struct Census {
     pub nodes: usize,
     /// Leaves: blocks of up to eight triangles.
     pub leaves: usize,
-    /// Grids.
+    /// Grids of all kinds.
     pub grids: usize,
-    /// Cells of all grids.
+    /// Cells of all grids but those that hold a node.
     pub cells: usize,
     /// Cells without a triangle.
     pub empty_cells: usize,
@@ -57,9 +58,9 @@ impl Census {
                 self.leaves += 1;
                 self.references += count as usize;
             }
-            Target::Grid(index) => self.add_grid(structure, &structure.grids[index as usize]),
             Target::Lazy(cell) => self.add_lazy(structure, cell as usize),
             Target::Empty => {}
+            _ => self.add_grid(structure, target),
         }
     }
 
@@ -71,12 +72,13 @@ impl Census {
         }
     }
 
-    fn add_grid(&mut self, structure: &Structure, grid: &Grid) {
-        let counts = (0..grid.cell_count()).map(|cell| structure.cell(grid, cell).len());
+    fn add_grid(&mut self, structure: &Structure, grid: Target) {
         self.grids += 1;
-        self.cells += grid.cell_count();
-        self.empty_cells += counts.clone().filter(|&count| count == 0).count();
-        self.references += counts.sum::<usize>();
+        for cell in content::cells(structure, grid) {
+            self.cells += 1;
+            self.empty_cells += usize::from(cell.count == 0);
+            self.references += cell.count;
+        }
     }
 }
 
@@ -106,21 +108,18 @@ fn work(structure: &Structure, place: &Place) -> f64 {
     match place.target {
         Target::Branch(_) => 1.0,
         Target::Leaf { .. } => cost.block_ns / cost.node_ns,
-        Target::Grid(index) => {
-            let grid = &structure.grids[index as usize];
-            let share = half_area(&grid.cell_bounds(0)) / half_area(&place.bounds).max(f64::MIN_POSITIVE);
-            share * cells_ns(structure, grid, &cost) / cost.node_ns
-        }
         Target::Lazy(cell) => {
             let blocks = structure.lazy.triangles(cell as usize).len().div_ceil(LANES);
             1.0 + LAZY_BLOCKS * blocks as f64 * cost.block_ns / cost.node_ns
         }
         Target::Empty => 0.0,
+        _ => {
+            let walked = content::cells(structure, place.target).map(|cell| {
+                let groups = cell.count.div_ceil(LANES) as f64;
+                half_area(&cell.bounds) * (cost.cell_ns + groups * cost.gather_ns)
+            });
+            let occupied = places::children(structure, place).map(|cell| half_area(&cell.bounds) * cost.cell_ns);
+            walked.chain(occupied).sum::<f64>() / half_area(&place.bounds).max(f64::MIN_POSITIVE) / cost.node_ns
+        }
     }
-}
-
-/// What walking through every cell of a grid once would cost.
-fn cells_ns(structure: &Structure, grid: &Grid, cost: &CostConstants) -> f64 {
-    let groups = (0..grid.cell_count()).map(|cell| structure.cell(grid, cell).len().div_ceil(LANES));
-    grid.cell_count() as f64 * cost.cell_ns + groups.sum::<usize>() as f64 * cost.gather_ns
 }

@@ -3,14 +3,14 @@
 use glam::{DVec3, Vec3};
 
 use super::{
-    check_lazy,
+    check_lattice, check_lazy,
     places::{self, Place, levels},
-    structure::{Grid, NodeRef, Structure, Target, View},
+    structure::{Grid, NEST_STACK, NodeRef, Structure, Target, View},
 };
 use crate::{Mesh, bounds::Bounds, ray::MISS, triangle::LANES};
 
 /// Grids of at most this many pairs of cell and triangle are compared with brute force.
-const BRUTE_FORCE: usize = 1 << 22;
+pub(super) const BRUTE_FORCE: usize = 1 << 22;
 
 /// Panic unless rays that walk `structure` can find every triangle of `mesh`.
 ///
@@ -30,9 +30,20 @@ pub fn assert_well_formed(structure: &Structure, mesh: &Mesh) {
             Target::Leaf { block, count } => assert_leaf(structure.view(), mesh, block as usize, count as usize),
             Target::Grid(grid) => assert_grid(structure, mesh, &structure.grids[grid as usize]),
             Target::Lazy(cell) => check_lazy::assert_cell(structure, mesh, cell as usize, &place.bounds),
-            Target::Empty => panic!("an empty place was reached"),
+            Target::Nest(nest) => check_lattice::assert_nest(structure, mesh, &structure.lattices.nests[nest as usize]),
+            Target::Irregular(grid) => {
+                check_lattice::assert_irregular(structure, mesh, &structure.lattices.irregular[grid as usize])
+            }
+            Target::Tetrahedral(grid) => {
+                check_lattice::assert_tetrahedral(structure, mesh, &structure.lattices.tetrahedral[grid as usize])
+            }
+            target => panic!("{target:?} was reached"),
         };
         for primitive in primitives {
+            if place.cell.is_some() {
+                check_lattice::assert_contains_part(structure, mesh, place, primitive);
+                continue;
+            }
             assert_contains(&place.bounds, &triangle_bounds(structure, mesh, primitive));
             let before = owner[primitive as usize].replace(index);
             assert_eq!(before, None, "triangle {primitive} stands in two places");
@@ -53,9 +64,11 @@ fn assert_all_reached(structure: &Structure, places: &[Place]) {
     let branches = indices(|target| if let Target::Branch(index) = target { Some(index) } else { None });
     let leaves = indices(|target| if let Target::Leaf { block, .. } = target { Some(block) } else { None });
     let grids = indices(|target| if let Target::Grid(index) = target { Some(index) } else { None });
+    let nests = indices(|target| if let Target::Nest(index) = target { Some(index) } else { None });
     assert_eq!(branches, all(structure.nodes.len()), "nodes not reached exactly once");
     assert_eq!(leaves, all(structure.blocks.len()), "blocks not reached exactly once");
     assert_eq!(grids, all(structure.grids.len()), "grids not reached exactly once");
+    assert_eq!(nests, all(structure.lattices.nests.len()), "nests not reached exactly once");
     let lazy = indices(|target| if let Target::Lazy(index) = target { Some(index) } else { None });
     assert_eq!(lazy, all(structure.lazy.len()), "lazy cells not reached exactly once");
 }
@@ -71,8 +84,9 @@ fn assert_branch(structure: &Structure, index: usize, place: &Place) {
         lanes.sort_unstable();
         assert_eq!(lanes, std::array::from_fn(|lane| lane as u32), "order of visits of node {index}");
     }
+    let around = check_lattice::reach(structure, place);
     for child in places::children(structure, place) {
-        assert_contains(&place.bounds, &child.bounds);
+        assert_contains(&around, &child.bounds);
         if let Target::Branch(below) = child.target {
             assert!(below as usize > index, "node {below} stands before its parent {index}");
         }
@@ -91,7 +105,7 @@ pub(super) fn assert_leaf(view: View<'_>, mesh: &Mesh, index: usize, count: usiz
 
 /// The distinct triangles of a grid.
 fn assert_grid(structure: &Structure, mesh: &Mesh, grid: &Grid) -> Vec<u32> {
-    assert!(grid.cell.iter().chain(&grid.inverse_cell).all(|edge| edge.is_finite() && *edge > 0.0), "{grid:?}");
+    assert_shape(grid);
     let row = &structure.starts[grid.first..=grid.first + grid.cell_count()];
     assert!(row.is_sorted() && row[grid.cell_count()] as usize <= structure.references.len(), "starts of {grid:?}");
     let mut primitives = structure.references[row[0] as usize..row[grid.cell_count()] as usize].to_vec();
@@ -103,36 +117,49 @@ fn assert_grid(structure: &Structure, mesh: &Mesh, grid: &Grid) -> Vec<u32> {
     primitives
 }
 
+pub(super) fn assert_shape(grid: &Grid) {
+    assert!(grid.cell.iter().chain(&grid.inverse_cell).all(|edge| edge.is_finite() && *edge > 0.0), "{grid:?}");
+}
+
 /// A cell lists what overlaps it, and nothing that is farther than twice the margin.
 fn assert_cell(structure: &Structure, mesh: &Mesh, grid: &Grid, cell: usize, primitives: &[u32]) {
-    let listed = structure.cell(grid, cell);
+    let listed = sorted(structure.cell(grid, cell));
+    assert_lists(structure, mesh, &grid.cell_bounds(cell), &listed, primitives);
+}
+
+/// In order, and each once.
+pub(super) fn sorted(listed: &[u32]) -> Vec<u32> {
     let mut sorted = listed.to_vec();
     sorted.sort_unstable();
-    assert!(sorted.windows(2).all(|pair| pair[0] < pair[1]), "cell {cell} lists a triangle twice: {listed:?}");
-    let bounds = grid.cell_bounds(cell);
+    assert!(sorted.windows(2).all(|pair| pair[0] < pair[1]), "a cell lists a triangle twice: {listed:?}");
+    sorted
+}
+
+/// What overlaps a box is listed, and nothing that is farther than twice the margin.
+pub(super) fn assert_lists(structure: &Structure, mesh: &Mesh, bounds: &Bounds, listed: &[u32], primitives: &[u32]) {
     let generous = bounds.dilated(2.0 * structure.domain.margin());
     for &primitive in primitives {
         let corners = mesh.corners(primitive).map(|corner| corner - structure.domain.centre);
-        let is_listed = sorted.binary_search(&primitive).is_ok();
-        assert!(is_listed || !overlaps(&bounds, corners), "cell {cell} lacks triangle {primitive}");
-        assert!(!is_listed || overlaps(&generous, corners), "cell {cell} lists triangle {primitive} from afar");
+        let is_listed = listed.binary_search(&primitive).is_ok();
+        assert!(is_listed || clipped(bounds, corners).is_empty(), "{bounds:?} lacks triangle {primitive}");
+        assert!(!is_listed || !clipped(&generous, corners).is_empty(), "{bounds:?} has triangle {primitive} from afar");
     }
 }
 
-/// Whether a triangle meets a box: what remains of it after a cut along every side, in double precision. Shares no
-/// arithmetic with the separating axes that grids are built by.
-fn overlaps(bounds: &Bounds, corners: [Vec3; 3]) -> bool {
+/// What remains of a triangle in a box after a cut along every side, in double precision. Shares no arithmetic with the
+/// separating axes that grids are built by.
+pub(super) fn clipped(bounds: &Bounds, corners: [Vec3; 3]) -> Vec<DVec3> {
     let mut polygon = corners.map(|corner| corner.as_dvec3()).to_vec();
     for axis in 0..3 {
         let (lower, upper) = (f64::from(bounds.lower[axis]), f64::from(bounds.upper[axis]));
         polygon = cut(&polygon, |point| point[axis] - lower);
         polygon = cut(&polygon, |point| upper - point[axis]);
     }
-    !polygon.is_empty()
+    polygon
 }
 
 /// The part of a convex polygon where `side` is not negative (Sutherland and Hodgman, CACM 17(1), 1974).
-fn cut(polygon: &[DVec3], side: impl Fn(DVec3) -> f64) -> Vec<DVec3> {
+pub(super) fn cut(polygon: &[DVec3], side: impl Fn(DVec3) -> f64) -> Vec<DVec3> {
     let mut rest = Vec::with_capacity(polygon.len() + 1);
     for (index, &point) in polygon.iter().enumerate() {
         let next = polygon[(index + 1) % polygon.len()];
@@ -166,14 +193,17 @@ pub(super) fn assert_contains(outer: &Bounds, inner: &Bounds) {
 /// The most entries that a walk from a place can have on its stack: all children but the one that is visited, at every
 /// level.
 fn stack_need(structure: &Structure, view: View<'_>, place: NodeRef) -> usize {
-    let node = match place.target() {
-        Target::Branch(index) => &view.nodes[index as usize],
+    let (own, children) = match place.target() {
+        Target::Branch(index) => {
+            let node = &view.nodes[index as usize];
+            (node.len() - 1, &node.child[..node.len()])
+        }
+        Target::Nest(index) => (NEST_STACK, structure.lattices.children(&structure.lattices.nests[index as usize])),
         Target::Lazy(cell) => {
             let cell = structure.lazy.refined(cell as usize);
             return cell.map_or(0, |cell| stack_need(structure, cell.view(), cell.root));
         }
         _ => return 0,
     };
-    let below = (0..node.len()).map(|lane| stack_need(structure, view, node.child[lane])).max();
-    node.len() - 1 + below.unwrap_or(0)
+    own + children.iter().map(|&child| stack_need(structure, view, child)).max().unwrap_or(0)
 }

@@ -1,4 +1,4 @@
-//! What the hybrids decided, and on what evidence.
+//! What hybrids, and others that decide, decided, and on what evidence.
 
 use crate::bounds::Bounds;
 
@@ -27,7 +27,10 @@ pub struct Decision {
     pub rays: u32,
     /// How many of them hit.
     pub hits: u32,
-    /// Index of dispersion of the hits over the strata of the box's surface.
+    /// The share of a grid's cells that are empty.
+    pub sparseness: f32,
+    /// Index of dispersion of the hits over the strata of the box's surface; of a grid that is tested, of the references
+    /// over the occupied cells.
     pub spread: f32,
     /// Least share of hits of a uniform node.
     pub hit_threshold: f32,
@@ -40,4 +43,24 @@ pub struct Decision {
     pub cost_bvh: f32,
     /// What it became.
     pub verdict: Verdict,
+}
+
+impl Decision {
+    /// One without evidence yet.
+    pub(super) fn open(bounds: Bounds, depth: u32, primitives: u32, verdict: Verdict) -> Self {
+        Self {
+            bounds,
+            depth,
+            primitives,
+            rays: 0,
+            hits: 0,
+            sparseness: f32::NAN,
+            spread: f32::NAN,
+            hit_threshold: f32::NAN,
+            spread_threshold: f32::NAN,
+            cost_grid: f32::NAN,
+            cost_bvh: f32::NAN,
+            verdict,
+        }
+    }
 }

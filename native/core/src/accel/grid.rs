@@ -67,6 +67,23 @@ pub fn build(
     units: u64,
 ) -> Result<BuiltGrid, Error> {
     let raster = Raster::new(domain, bounds, resolution);
+    let cells_of = |item: &Item, pairs: &mut Vec<[u32; 2]>| pairs.extend(raster.cells_of(mesh, item));
+    let (starts, references) = listed(items, raster.grid.cell_count(), job, units, cells_of)?;
+    Ok(BuiltGrid { grid: raster.grid, starts, references })
+}
+
+/// The lists of `cell_count` cells, in the order of items: where each begins, and the triangles. `cells_of` appends an
+/// item's cells, paired with its triangle.
+///
+/// # Errors
+/// [`Error::Cancelled`], [`Error::OutOfMemory`].
+pub(super) fn listed(
+    items: &[Item],
+    cell_count: usize,
+    job: &Job,
+    units: u64,
+    cells_of: impl Fn(&Item, &mut Vec<[u32; 2]>) + Sync,
+) -> Result<(Vec<u32>, Vec<u32>), Error> {
     let parts: Vec<Vec<[u32; 2]>> = items
         .par_chunks(PART)
         .map(|part| {
@@ -74,15 +91,13 @@ pub fn build(
             for item in part {
                 // One item may fill all cells, so even a part is too long to wait for.
                 job.check()?;
-                pairs.extend(raster.cells_of(mesh, item));
+                cells_of(item, &mut pairs);
             }
             job.advance(units * part.len() as u64);
             Ok(pairs)
         })
         .collect::<Result<_, Error>>()?;
-    let grid = raster.grid;
-    let (starts, references) = sort_by_cell(&parts, grid.cell_count(), job)?;
-    Ok(BuiltGrid { grid, starts, references })
+    sort_by_cell(&parts, cell_count, job)
 }
 
 /// Cells or pairs that are gone through between two looks at the job: some milliseconds.
@@ -119,14 +134,19 @@ fn sort_by_cell(parts: &[Vec<[u32; 2]>], cell_count: usize, job: &Job) -> Result
     Ok((starts, references))
 }
 
-struct Raster {
-    grid: Grid,
-    centre: Vec3,
-    margin: f32,
+/// The cells of a grid, and which of them a triangle is listed in.
+pub(super) struct Raster {
+    /// The shape; `first` is 0.
+    pub grid: Grid,
+    /// The centre of the domain.
+    pub centre: Vec3,
+    /// The domain's margin.
+    pub margin: f32,
 }
 
 impl Raster {
-    fn new(domain: &Domain, bounds: &Bounds, resolution: [u32; 3]) -> Self {
+    /// Over a box in the mesh's own coordinates.
+    pub fn new(domain: &Domain, bounds: &Bounds, resolution: [u32; 3]) -> Self {
         let (lower, upper) = (bounds.lower - domain.centre, bounds.upper - domain.centre);
         // A flat axis gets one cell that is as thick as the margin, so that its inverse is finite.
         let extent = (upper - lower).max(Vec3::splat(domain.margin())).to_array();
@@ -143,7 +163,7 @@ impl Raster {
     }
 
     /// The cells that a triangle comes within the margin of, paired with it.
-    fn cells_of(&self, mesh: &Mesh, item: &Item) -> impl Iterator<Item = [u32; 2]> {
+    pub fn cells_of(&self, mesh: &Mesh, item: &Item) -> impl Iterator<Item = [u32; 2]> {
         let corners = mesh.corners(item.primitive).map(|corner| corner - self.centre);
         let [x, y, z] = self.range(&Bounds::of_points(corners));
         let is_single = x.len() * y.len() * z.len() == 1;

@@ -109,19 +109,7 @@ impl Inquiry<'_> {
     fn undecided(&self, index: usize, depth: u32) -> Decision {
         let node = &self.tree.nodes[index];
         let verdict = if node.kind == Kind::Leaf { Verdict::Leaf } else { Verdict::Split };
-        Decision {
-            bounds: node.bounds,
-            depth,
-            primitives: node.count,
-            rays: 0,
-            hits: 0,
-            spread: f32::NAN,
-            hit_threshold: f32::NAN,
-            spread_threshold: f32::NAN,
-            cost_grid: f32::NAN,
-            cost_bvh: f32::NAN,
-            verdict,
-        }
+        Decision::open(node.bounds, depth, node.count, verdict)
     }
 
     /// The node's sample rays.

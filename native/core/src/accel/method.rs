@@ -15,6 +15,16 @@ pub enum Method {
     Lbvh,
     /// One uniform grid.
     Grid,
+    /// A coarse grid whose cells are grids.
+    GridTwoLevel,
+    /// A grid whose cells were merged.
+    GridIrregular,
+    /// A grid of tetrahedra.
+    GridTetrahedral,
+    /// A grid, replaced by a hierarchy where a test of it finds that worth while.
+    Hapala,
+    /// Hierarchies in grids in hierarchies, by surface areas.
+    Fellner,
     /// The paper's hybrid: sampled rays decide which nodes become grids.
     HybridSampled,
     /// The same tree and samples, decided by expected cost.
@@ -41,6 +51,17 @@ pub enum Judgement {
     ExpectedCost,
 }
 
+/// Which kind of grid stands over everything.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Lattice {
+    /// [`two_level`](super::two_level)
+    TwoLevel,
+    /// [`irregular`](super::irregular)
+    Irregular,
+    /// [`tetrahedra`](super::tetrahedra)
+    Tetrahedral,
+}
+
 /// What a method builds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Recipe {
@@ -52,6 +73,12 @@ pub enum Recipe {
     Linear,
     /// One grid over everything.
     Grid,
+    /// One grid of another kind.
+    Lattice(Lattice),
+    /// [`hapala`](super::hapala)
+    Hapala,
+    /// [`fellner`](super::fellner)
+    Fellner,
     /// A median tree, some of whose nodes become grids.
     Hybrid(Judgement),
     /// A hierarchy of [lazy cells](super::instant).
@@ -78,6 +105,11 @@ const ROWS: &[Row] = &[
     row(Method::BvhClusters, "bvh-clusters", Recipe::Clustered, 3),
     row(Method::Lbvh, "lbvh", Recipe::Linear, 2),
     row(Method::Grid, "grid", Recipe::Grid, 2),
+    row(Method::GridTwoLevel, "grid-two-level", Recipe::Lattice(Lattice::TwoLevel), 2),
+    row(Method::GridIrregular, "grid-irregular", Recipe::Lattice(Lattice::Irregular), 2),
+    row(Method::GridTetrahedral, "grid-tetrahedral", Recipe::Lattice(Lattice::Tetrahedral), 1),
+    row(Method::Hapala, "hapala", Recipe::Hapala, 3),
+    row(Method::Fellner, "fellner", Recipe::Fellner, 3),
     row(Method::HybridSampled, "hybrid-sampled", Recipe::Hybrid(Judgement::Sampled), 3),
     row(Method::HybridCost, "hybrid-cost", Recipe::Hybrid(Judgement::ExpectedCost), 3),
     row(Method::Hybrid, "hybrid", Recipe::Lazy, 1),

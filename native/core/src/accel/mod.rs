@@ -5,23 +5,32 @@ pub mod calibrate;
 pub mod cells;
 pub mod census;
 pub mod check;
+mod check_lattice;
 mod check_lazy;
 pub mod clustered;
 pub mod clusters;
 pub mod config;
+pub mod content;
 pub mod decision;
 pub mod draft;
+mod expand;
 pub mod expected;
+pub mod fellner;
 pub mod forest;
 pub mod grid;
+pub mod hapala;
 pub mod hybrid;
 pub mod instant;
+pub mod irregular;
+pub mod lattice;
+mod lattices;
 pub mod lazy;
 pub mod lbvh;
 pub mod median;
 pub mod method;
 pub mod morton;
 pub mod nearest;
+pub mod nest;
 pub mod overlap;
 pub mod pack;
 pub mod places;
@@ -33,7 +42,9 @@ pub mod small;
 pub mod structure;
 pub mod subtree;
 pub mod sweep;
+pub mod tetrahedra;
 pub mod tree;
+pub mod two_level;
 
 use std::{sync::Arc, time::Instant};
 
@@ -116,7 +127,7 @@ impl Accelerator {
         &self.phases
     }
 
-    /// What a hybrid decided on, from the root down; empty for other methods.
+    /// What a method that decides by evidence decided, from the root down; empty for other methods.
     pub fn decisions(&self) -> &[Decision] {
         &self.decisions
     }
@@ -180,6 +191,9 @@ impl Builder<'_> {
             Recipe::Clustered => return self.clustered(),
             Recipe::Linear => return self.linear(),
             Recipe::Grid => self.single_grid()?,
+            Recipe::Lattice(lattice) => return self.lattice(lattice),
+            Recipe::Hapala => self.grid_or_hierarchy()?,
+            Recipe::Fellner => self.fellner()?,
             Recipe::Hybrid(Judgement::Sampled) => self.hybrid(&hybrid::Sampled)?,
             Recipe::Hybrid(Judgement::ExpectedCost) => self.hybrid(&expected::ExpectedCost)?,
         };
@@ -227,7 +241,7 @@ impl Builder<'_> {
         }
         let grid = self.timed("grid", |this| this.grid(&items))?;
         let root = TreeNode { bounds: self.mesh.bounds(), first: 0, count: items.len() as u32, kind: Kind::Grid(0) };
-        Ok(Tree { nodes: vec![root], items, grids: vec![grid] })
+        Ok(Tree { nodes: vec![root], items, grids: vec![grid], ..Tree::default() })
     }
 
     fn grid(&self, items: &[tree::Item]) -> Result<BuiltGrid, Error> {

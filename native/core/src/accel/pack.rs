@@ -5,8 +5,9 @@
 use glam::Vec3;
 
 use super::{
-    structure::{Node, NodeRef, Structure},
-    tree::{Kind, Tree},
+    lattice::Lattices,
+    structure::{Grid, NEST_STACK, Node, NodeRef, Structure},
+    tree::{BuiltNest, Kind, Tree},
 };
 use crate::{
     Error, Job, Mesh, arena::Arena, bounds::Bounds, error, traverse::frame::Domain, triangle::Block, triangle::LANES,
@@ -20,11 +21,12 @@ pub fn pack(tree: &Tree, mesh: &Mesh, job: &Job) -> Result<Structure, Error> {
     let domain = Domain::new(&mesh.bounds());
     let leaves = tree.nodes.iter().filter(|node| node.kind == Kind::Leaf).count();
     let (blocks, nodes) = (Arena::with_capacity(leaves, "the leaves")?, Arena::with_capacity(leaves, "the nodes")?);
-    let mut packer = Packer { tree, mesh, job, centre: domain.centre, nodes, blocks };
+    let (lattices, nested) = (Lattices::default(), 0);
+    let mut packer = Packer { tree, mesh, job, centre: domain.centre, nodes, blocks, lattices, nested };
     let packed = if tree.nodes.is_empty() { Packed::EMPTY } else { packer.subtree(0)? };
-    let (nodes, blocks) = (packer.nodes, packer.blocks);
-    let empty = Structure::of(packed.root, domain);
-    let mut structure = Structure { nodes, blocks, stack_size: packed.stack_size, ..empty };
+    let Packer { nodes, blocks, lattices, .. } = packer;
+    let stack_size = packed.stack_size;
+    let mut structure = Structure { nodes, blocks, lattices, stack_size, ..Structure::of(packed.root, domain) };
     join_grids(tree, &mut structure)?;
     Ok(structure)
 }
@@ -47,17 +49,45 @@ struct Packer<'a> {
     centre: Vec3,
     nodes: Arena<Node>,
     blocks: Arena<Block>,
+    lattices: Lattices,
+    /// In how many nests the current subtree is.
+    nested: usize,
 }
 
 impl Packer<'_> {
     fn subtree(&mut self, index: usize) -> Result<Packed, Error> {
-        let root = match self.tree.nodes[index].kind {
+        let packed = match self.tree.nodes[index].kind {
             Kind::Branch { .. } => return self.branch(index),
-            Kind::Leaf => self.leaf(index),
-            Kind::Grid(grid) => NodeRef::grid(grid as usize),
+            Kind::Leaf => Packed { root: self.leaf(index), stack_size: 0 },
+            Kind::Grid(grid) => Packed { root: NodeRef::grid(grid as usize), stack_size: 0 },
+            Kind::Nest(nest) => self.nest(&self.tree.nests[nest as usize])?,
         };
-        self.job.advance(u64::from(self.tree.nodes[index].count));
-        Ok(Packed { root, stack_size: 0 })
+        // What is in cells is counted where the nest is: items may be in many of them.
+        if self.nested == 0 {
+            self.job.advance(u64::from(self.tree.nodes[index].count));
+        }
+        Ok(packed)
+    }
+
+    fn nest(&mut self, built: &BuiltNest) -> Result<Packed, Error> {
+        let (index, first) = (self.lattices.nests.len(), self.lattices.children.len());
+        error::grow(
+            &mut self.lattices.children,
+            first + built.grid.cell_count(),
+            NodeRef::EMPTY,
+            "the cells of nests",
+        )?;
+        self.lattices.nests.push(Grid { first, ..built.grid.clone() });
+        self.nested += 1;
+        let mut deepest = 0;
+        for &[cell, node] in &built.cells {
+            self.job.check()?;
+            let packed = self.subtree(node as usize)?;
+            self.lattices.children[first + cell as usize] = packed.root;
+            deepest = deepest.max(packed.stack_size);
+        }
+        self.nested -= 1;
+        Ok(Packed { root: NodeRef::nest(index), stack_size: NEST_STACK + deepest })
     }
 
     fn branch(&mut self, index: usize) -> Result<Packed, Error> {
@@ -124,7 +154,7 @@ fn join_grids(tree: &Tree, structure: &mut Structure) -> Result<(), Error> {
     structure.references = error::reserve(references, "the references of all grid cells")?;
     for built in &tree.grids {
         let (first, offset) = (structure.starts.len(), structure.references.len() as u32);
-        structure.grids.push(super::structure::Grid { first, ..built.grid.clone() });
+        structure.grids.push(Grid { first, ..built.grid.clone() });
         structure.starts.extend(built.starts.iter().map(|start| start + offset));
         structure.references.extend_from_slice(&built.references);
     }

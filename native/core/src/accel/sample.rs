@@ -109,6 +109,8 @@ impl Surface {
 pub struct Samples {
     columns: [Vec<f32>; 6],
     strata: Vec<usize>,
+    /// Where rays begin: at their origins, or at the other end of their lines.
+    begin: f32,
 }
 
 impl Samples {
@@ -116,7 +118,7 @@ impl Samples {
     /// a point of another face. `node` tells the streams of random numbers of one seed apart.
     pub fn new(bounds: &Bounds, count: usize, seed: u64, node: usize) -> Self {
         let surface = Surface::new(bounds);
-        let mut samples = Self { columns: Default::default(), strata: Vec::new() };
+        let mut samples = Self { columns: Default::default(), strata: Vec::new(), begin: f32::NEG_INFINITY };
         let mut generator = Generator::new(seed, node as u64);
         let (mut area, total) = (0.0, surface.total_area());
         for face in 0..6 {
@@ -124,6 +126,20 @@ impl Samples {
             area += surface.area(face);
             let after = (area / total * count as f64).round();
             samples.add_face(&surface, face, (after - before) as usize, &mut generator);
+        }
+        samples
+    }
+
+    /// `count` rays between points anywhere in a box, from the first point of each pair on: also in what is closed, such
+    /// as a hall, there are some that begin inside.
+    pub fn within(bounds: &Bounds, count: usize, seed: u64) -> Self {
+        let mut samples = Self { columns: Default::default(), strata: vec![count], begin: 0.0 };
+        let mut generator = Generator::new(seed, 0);
+        let (lower, extent) = (bounds.lower.as_dvec3(), bounds.extent().as_dvec3());
+        for _ in 0..count {
+            let mut point = || lower + extent * DVec3::from_array([(); 3].map(|()| generator.uniform()));
+            let (origin, target) = (point(), point());
+            samples.push(origin, target);
         }
         samples
     }
@@ -153,6 +169,10 @@ impl Samples {
         let origin = surface.point(face, place);
         let other = surface.other_face(face, generator.uniform());
         let target = surface.point(other, [generator.uniform(), generator.uniform()]);
+        self.push(origin, target);
+    }
+
+    fn push(&mut self, origin: DVec3, target: DVec3) {
         // Of unit length, so that no box is too small for its directions.
         let direction = (target - origin).normalize_or(DVec3::X);
         let values = [origin.as_vec3(), direction.as_vec3()].map(|value| value.to_array());
@@ -169,13 +189,13 @@ impl Samples {
         self.len() == 0
     }
 
-    /// The rays, followed to both ends: a triangle on the box's own surface counts however origins are rounded.
+    /// The rays; those through a whole box are followed to both ends: a triangle on the box's own surface counts however origins are rounded.
     ///
     /// # Errors
     /// None; the signature is that of [`Rays::new`].
     pub fn rays(&self) -> Result<Rays<'_>, Error> {
         let [ox, oy, oz, dx, dy, dz] = self.columns.each_ref().map(|column| Column::new(column));
-        let ends = [&f32::NEG_INFINITY, &f32::INFINITY].map(Column::constant);
+        let ends = [&self.begin, &f32::INFINITY].map(Column::constant);
         Rays::new([ox, oy, oz], [dx, dy, dz], ends[0], ends[1], self.len())
     }
 

@@ -4,7 +4,7 @@
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3A;
 
-use super::lazy::LazyCells;
+use super::{lattice::Lattices, lazy::LazyCells};
 use crate::{
     arena::Arena,
     bounds::BoundsA,
@@ -33,6 +33,14 @@ pub enum Target {
     Grid(u32),
     /// Index into [`Structure::lazy`].
     Lazy(u32),
+    /// Index into [`Lattices::nests`](super::lattice::Lattices::nests).
+    Nest(u32),
+    /// A nest whose walk waits on a traversal's stack, above the cell it has reached; in no structure.
+    Resume(u32),
+    /// Index into [`Lattices::irregular`](super::lattice::Lattices::irregular).
+    Irregular(u32),
+    /// Index into [`Lattices::tetrahedral`](super::lattice::Lattices::tetrahedral).
+    Tetrahedral(u32),
     /// Nothing.
     Empty,
 }
@@ -42,6 +50,11 @@ impl NodeRef {
     const COUNT: u32 = 27;
     /// Stands where a leaf has its count.
     const LAZY: u32 = 1;
+    /// Which kind of grid one is stands where a leaf has its count.
+    const NEST: u32 = 1;
+    const RESUME: u32 = 2;
+    const IRREGULAR: u32 = 3;
+    const TETRAHEDRAL: u32 = 4;
     /// Indices are below this; [`crate::Mesh`] bounds the number of triangles by it, and every builder makes at most
     /// one block or node a triangle.
     const INDEX: u32 = (1 << Self::COUNT) - 1;
@@ -63,8 +76,45 @@ impl NodeRef {
 
     /// A grid.
     pub fn grid(index: usize) -> Self {
+        Self::of_kind(0, index)
+    }
+
+    /// A grid whose cells are nodes.
+    pub fn nest(index: usize) -> Self {
+        Self::of_kind(Self::NEST, index)
+    }
+
+    /// A grid of merged cells.
+    pub fn irregular(index: usize) -> Self {
+        Self::of_kind(Self::IRREGULAR, index)
+    }
+
+    /// A grid of tetrahedra.
+    pub fn tetrahedral(index: usize) -> Self {
+        Self::of_kind(Self::TETRAHEDRAL, index)
+    }
+
+    fn of_kind(kind: u32, index: usize) -> Self {
         assert!(index <= Self::INDEX as usize);
-        Self(2 << Self::TAG | index as u32)
+        Self(2 << Self::TAG | kind << Self::COUNT | index as u32)
+    }
+
+    /// What waits on the stack while a cell of a nest is searched: the nest, to be gone on with.
+    #[inline(always)]
+    pub fn resume(nest: u32) -> Self {
+        Self(2 << Self::TAG | Self::RESUME << Self::COUNT | nest)
+    }
+
+    /// What lies below it on the stack: the cell, each coordinate below [`MOST_NEST_EDGE`]. No target at all.
+    #[inline(always)]
+    pub fn of_cell([x, y, z]: [i32; 3]) -> Self {
+        Self((x | y << CELL_BITS | z << (2 * CELL_BITS)) as u32)
+    }
+
+    /// The cell that [`NodeRef::of_cell`] was given.
+    #[inline(always)]
+    pub fn cell(self) -> [i32; 3] {
+        [0, CELL_BITS, 2 * CELL_BITS].map(|shift| (self.0 >> shift) as i32 & (MOST_NEST_EDGE as i32 - 1))
     }
 
     /// A cell that becomes a subtree when a ray reaches it.
@@ -89,12 +139,32 @@ impl NodeRef {
         match self.0 >> Self::TAG {
             0 => Target::Branch(self.0),
             1 => Target::Leaf { block: self.0 & Self::INDEX, count: (self.0 >> Self::COUNT & 7) + 1 },
-            2 => Target::Grid(self.0 & Self::INDEX),
+            2 => self.grid_target(),
             _ if self == Self::EMPTY => Target::Empty,
             _ => Target::Lazy(self.0 & Self::INDEX),
         }
     }
+
+    #[inline(always)]
+    fn grid_target(self) -> Target {
+        let index = self.0 & Self::INDEX;
+        match self.0 >> Self::COUNT & 7 {
+            Self::NEST => Target::Nest(index),
+            Self::RESUME => Target::Resume(index),
+            Self::IRREGULAR => Target::Irregular(index),
+            Self::TETRAHEDRAL => Target::Tetrahedral(index),
+            _ => Target::Grid(index),
+        }
+    }
 }
+
+const CELL_BITS: u32 = 10;
+
+/// Cells of a nest along an axis: three coordinates fit into a reference.
+pub const MOST_NEST_EDGE: u32 = 1 << CELL_BITS;
+
+/// Entries that a walk through a nest takes on the stack while a cell is searched.
+pub const NEST_STACK: usize = 2;
 
 /// Eight children with their boxes, relative to the centre of the domain.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
@@ -235,6 +305,8 @@ pub struct Structure {
     pub references: Vec<u32>,
     /// Cells that become subtrees when a ray reaches them.
     pub lazy: LazyCells,
+    /// Grids of other kinds.
+    pub lattices: Lattices,
     /// No traversal holds more entries on its stack.
     pub stack_size: usize,
 }
@@ -260,6 +332,7 @@ impl Structure {
             starts: Vec::new(),
             references: Vec::new(),
             lazy: LazyCells::default(),
+            lattices: Lattices::default(),
             stack_size: 0,
         }
     }
@@ -272,7 +345,7 @@ impl Structure {
 
     /// Whether rays may meet anything but branches and leaves.
     pub fn has_grids(&self) -> bool {
-        !self.grids.is_empty() || !self.lazy.is_empty()
+        !self.grids.is_empty() || !self.lattices.is_empty() || !self.lazy.is_empty()
     }
 
     /// The triangles in a cell of a grid.
@@ -291,5 +364,6 @@ impl Structure {
             + size_of_val(&*self.starts)
             + size_of_val(&*self.references)
             + self.lazy.bytes()
+            + self.lattices.bytes()
     }
 }

@@ -3,6 +3,7 @@
 
 use rayon::prelude::*;
 
+use super::{grid::BuiltGrid, structure::Grid};
 use crate::{Error, Job, Mesh, bounds::Bounds, error};
 
 /// A triangle on its way into the tree.
@@ -26,6 +27,8 @@ pub enum Kind {
     Leaf,
     /// Its items are in [`Tree::grids`] at this index; nodes below it, if any, are passed over.
     Grid(u32),
+    /// Its items are below the cells of [`Tree::nests`] at this index.
+    Nest(u32),
 }
 
 /// A node over the items `first..first + count`.
@@ -49,7 +52,19 @@ pub struct Tree {
     /// Ordered so that every node's items stand together.
     pub items: Vec<Item>,
     /// Grids that stand in for nodes.
-    pub grids: Vec<super::grid::BuiltGrid>,
+    pub grids: Vec<BuiltGrid>,
+    /// Grids that stand in for nodes and have nodes in their cells: such nodes, and all below them, are behind those
+    /// that are reached without nests.
+    pub nests: Vec<BuiltNest>,
+}
+
+/// A grid whose cells are nodes.
+#[derive(Debug, Clone)]
+pub struct BuiltNest {
+    /// Its shape; `first` is 0.
+    pub grid: Grid,
+    /// Every cell that holds anything, and the node it holds.
+    pub cells: Vec<[u32; 2]>,
 }
 
 impl Tree {
@@ -62,7 +77,7 @@ impl Tree {
     pub fn children(&self, index: usize) -> Option<[usize; 2]> {
         match self.nodes[index].kind {
             Kind::Branch { right } => Some([index + 1, index + right as usize]),
-            Kind::Leaf | Kind::Grid(_) => None,
+            Kind::Leaf | Kind::Grid(_) | Kind::Nest(_) => None,
         }
     }
 }
@@ -106,18 +121,33 @@ const SEQUENTIAL: usize = 1 << 13;
 ///
 /// # Errors
 /// [`Error::Cancelled`].
-pub fn build(mut items: Vec<Item>, leaf_size: usize, split: &impl Split, job: &Job) -> Result<Tree, Error> {
+pub fn build(items: Vec<Item>, leaf_size: usize, split: &impl Split, job: &Job) -> Result<Tree, Error> {
+    build_counted(items, leaf_size, split, job, 1)
+}
+
+/// The same, where every item counts `units` in the job's progress.
+///
+/// # Errors
+/// [`Error::Cancelled`].
+pub fn build_counted(
+    mut items: Vec<Item>,
+    leaf_size: usize,
+    split: &impl Split,
+    job: &Job,
+    units: u64,
+) -> Result<Tree, Error> {
     if items.is_empty() {
         return Ok(Tree::default());
     }
-    let nodes = Builder { leaf_size, split, job }.parallel(&mut items, 0, 0)?;
-    Ok(Tree { nodes, items, grids: Vec::new() })
+    let nodes = Builder { leaf_size, split, job, units }.parallel(&mut items, 0, 0)?;
+    Ok(Tree { nodes, items, ..Tree::default() })
 }
 
 struct Builder<'a, S> {
     leaf_size: usize,
     split: &'a S,
     job: &'a Job,
+    units: u64,
 }
 
 impl<S: Split> Builder<'_, S> {
@@ -127,7 +157,7 @@ impl<S: Split> Builder<'_, S> {
         if items.len() <= SEQUENTIAL {
             nodes.reserve(2 * items.len() / self.leaf_size + 1);
             self.sequential(items, first, depth, &mut nodes);
-            self.job.advance(items.len() as u64);
+            self.job.advance(self.units * items.len() as u64);
             return Ok(nodes);
         }
         let bounds = bounds_of(items);

@@ -13,12 +13,16 @@ use crate::{
     simd::Simd,
 };
 
-struct Walk {
-    index: isize,
-    cell: [i32; 3],
+/// Where a walk is.
+pub struct Walk {
+    /// The current cell.
+    pub index: isize,
+    /// The same along each axis.
+    pub cell: [i32; 3],
     step: [i32; 3],
     stride: [isize; 3],
-    crossing: [f32; 3],
+    /// Where the ray leaves it along each axis.
+    pub crossing: [f32; 3],
 }
 
 /// Search a grid; true once there is any hit, where `any` is wanted.
@@ -46,14 +50,34 @@ pub fn walk<S: Simd, P: Probe, const ANY: bool>(
     }
 }
 
+/// The parameter at which the ray leaves what lies before a plane along `axis`. Behind the grid's last plane there is no
+/// cell that would make up for a rounding error, so the grid ends where its dilated box does.
+#[inline(always)]
+pub fn crossing(plane: i32, axis: usize, frame: &Frame, grid: &Grid) -> f32 {
+    let position = grid.lower[axis] + plane as f32 * grid.cell[axis];
+    if plane == 0 || plane == grid.resolution[axis] as i32 {
+        position * frame.inverse[axis] + frame.far_bias[axis]
+    } else {
+        (position - frame.local[axis]) * frame.inverse[axis]
+    }
+}
+
 impl Walk {
+    /// In the cell where the ray is at `enter`.
     #[inline(always)]
-    fn new(frame: &Frame, grid: &Grid, enter: f32) -> Self {
-        let resolution = grid.resolution.map(|r| r as i32);
-        let cell: [i32; 3] = std::array::from_fn(|k| {
+    pub fn new(frame: &Frame, grid: &Grid, enter: f32) -> Self {
+        let cell = std::array::from_fn(|k| {
             let position = frame.local[k] + frame.direction[k] * enter;
-            (((position - grid.lower[k]) * grid.inverse_cell[k]).floor() as i32).clamp(0, resolution[k] - 1)
+            // Towards zero, which differs from the floor only below the first cell.
+            (((position - grid.lower[k]) * grid.inverse_cell[k]) as i32).clamp(0, grid.resolution[k] as i32 - 1)
         });
+        Self::at(cell, frame, grid)
+    }
+
+    /// In a cell.
+    #[inline(always)]
+    pub fn at(cell: [i32; 3], frame: &Frame, grid: &Grid) -> Self {
+        let resolution = grid.resolution.map(|r| r as i32);
         let step = frame.inverse.map(|inverse| if inverse < 0.0 { -1 } else { 1 });
         let rows = [1, resolution[0] as isize, resolution[0] as isize * resolution[1] as isize];
         let mut walk = Self {
@@ -67,22 +91,15 @@ impl Walk {
         walk
     }
 
-    /// The parameter at which the ray leaves the current cell along `axis`. Behind the grid's last plane there is no
-    /// cell that would make up for a rounding error, so the grid ends where its dilated box does.
+    /// The parameter at which the ray leaves the current cell along `axis`.
     #[inline(always)]
     fn crossing(&self, axis: usize, frame: &Frame, grid: &Grid) -> f32 {
-        let plane = self.cell[axis] + i32::from(self.step[axis] > 0);
-        let position = grid.lower[axis] + plane as f32 * grid.cell[axis];
-        if plane == 0 || plane == grid.resolution[axis] as i32 {
-            position * frame.inverse[axis] + frame.far_bias[axis]
-        } else {
-            (position - frame.local[axis]) * frame.inverse[axis]
-        }
+        crossing(self.cell[axis] + i32::from(self.step[axis] > 0), axis, frame, grid)
     }
 
     /// The axis along which the ray leaves the current cell first.
     #[inline(always)]
-    fn next_axis(&self) -> usize {
+    pub fn next_axis(&self) -> usize {
         let [x, y, z] = self.crossing;
         if x <= y && x <= z {
             0
@@ -95,7 +112,7 @@ impl Walk {
 
     /// Step into the next cell; false where the grid ends.
     #[inline(always)]
-    fn advance(&mut self, axis: usize, frame: &Frame, grid: &Grid) -> bool {
+    pub fn advance(&mut self, axis: usize, frame: &Frame, grid: &Grid) -> bool {
         self.cell[axis] += self.step[axis];
         self.index += self.stride[axis];
         let inside = (self.cell[axis] as u32) < grid.resolution[axis];

@@ -5,6 +5,7 @@ use super::{
     dda,
     frame::Frame,
     leaf::{Best, Search},
+    lists, nest,
     probe::Probe,
 };
 use crate::{
@@ -17,8 +18,8 @@ use crate::{
 /// A subtree to visit, and where the ray enters it.
 #[derive(Debug, Clone, Copy)]
 pub struct Entry {
-    near: f32,
-    node: NodeRef,
+    pub(super) near: f32,
+    pub(super) node: NodeRef,
 }
 
 impl Entry {
@@ -116,6 +117,17 @@ pub fn trace_below<S: Simd, P: Probe, const GRIDS: bool, const ANY: bool>(
                 }
                 None => search.gather::<ANY>(structure.lazy.triangles(index as usize)),
             },
+            target @ (Target::Nest(_) | Target::Resume(_)) if GRIDS => {
+                let ray = (search.frame, &mut *search.probe, search.best.high);
+                if let Some(node) = nest::next(ray, structure, target, stack, &mut depth) {
+                    current = node;
+                    continue;
+                }
+                false
+            }
+            target @ (Target::Irregular(_) | Target::Tetrahedral(_)) if GRIDS => {
+                lists::walk::<S, P, ANY>(search, structure, target)
+            }
             _ => false,
         };
         if ANY && found {

@@ -6,10 +6,14 @@ mod dda;
 #[allow(dead_code)] // Until the traversers that come next call it.
 mod exact;
 pub mod frame;
+mod irregular;
 mod kernel;
 mod leaf;
+mod lists;
+mod nest;
 pub mod probe;
 mod setup;
 mod stream;
+mod tetrahedra;
 
 pub use batch::Tracer;

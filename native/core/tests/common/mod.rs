@@ -204,12 +204,26 @@ pub fn eager() -> Config {
     }
 }
 
+/// Settings under which grids hold hierarchies and grids, and hierarchies such grids, in small meshes, too.
+pub fn nested() -> Config {
+    Config {
+        grid_density: 1.0,
+        grid_least_triangles: 9,
+        grid_most_triangles: 100,
+        nesting: 3,
+        cost: CostConstants { node_ns: 100.0, block_ns: 1.0, cell_ns: 0.1, gather_ns: 1e5, reference_ns: 0.0 },
+        ..Config::default()
+    }
+}
+
 /// A variant's method and settings. Its name is the method's with underscores; those of hybrids have a second one,
-/// `eager_` instead of `hybrid_`.
+/// `eager_` instead of `hybrid_`, and the methods that decide otherwise a second one with settings in front.
 pub fn variant(name: &str) -> (Method, Config) {
-    let (wanted, config) = match name.strip_prefix("eager_") {
-        Some(judge) => (format!("hybrid_{judge}"), eager()),
-        None => (name.to_owned(), Config::default()),
+    let (wanted, config) = match name.split_once('_') {
+        Some(("eager", judge)) => (format!("hybrid_{judge}"), eager()),
+        Some(("nested", method)) => (method.to_owned(), nested()),
+        Some(("tried", method)) => (method.to_owned(), Config { expected_rays: 0.0, ..Config::default() }),
+        _ => (name.to_owned(), Config::default()),
     };
     let method = Method::ALL.into_iter().find(|method| method.name().replace(['-', '+'], "_") == wanted);
     (method.unwrap_or_else(|| panic!("no variant {name}")), config)
@@ -229,7 +243,8 @@ pub fn run(name: &str, level: &str, test: impl Fn(&Walk)) {
 macro_rules! every_walk {
     ($tests:tt) => {
         $crate::every_walk!(@variants $tests;
-            bvh_median, bvh_sah, bvh_clusters, lbvh, grid, hybrid_sampled, hybrid_cost, hybrid, eager_sampled, eager_cost);
+            bvh_median, bvh_sah, bvh_clusters, lbvh, grid, grid_two_level, grid_irregular, grid_tetrahedral, hapala,
+            tried_hapala, fellner, nested_fellner, hybrid_sampled, hybrid_cost, hybrid, eager_sampled, eager_cost);
     };
     (@variants $tests:tt; $($variant:ident),+) => {
         #[test]
