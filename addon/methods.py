@@ -27,11 +27,9 @@ METHODS: tuple[Method, ...] = (
     ),
     Method("lbvh", "Linear BVH", "Bounding volume hierarchy along a space-filling curve: the fastest to build"),
     Method("grid", "Uniform Grid", "One uniform grid of cells over the whole scene"),
-    Method("grid-two-level", "Two-Level Grid", "A coarse grid whose cells are grids, each as fine as its triangles ask for"),
-    Method("grid-irregular", "Irregular Grid", "A grid whose cells are merged where that is cheaper, to cross space fast"),
-    Method(
-        "grid-tetrahedral", "Tetrahedral Grid", "As many tetrahedra of equal volume as the uniform grid has cells"
-    ),
+    Method("grid-two-level", "Two-Level Grid", "A coarse grid whose cells are grids, as fine as their triangles ask"),
+    Method("grid-irregular", "Irregular Grid", "A grid whose cells are merged where that is cheaper"),
+    Method("grid-tetrahedral", "Tetrahedral Grid", "As many tetrahedra of equal volume as the uniform grid has cells"),
     Method(
         "hapala",
         "Tested Grid",

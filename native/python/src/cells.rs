@@ -15,8 +15,8 @@ pub struct Cells {
     /// (n, 3) float32: greatest corners.
     #[pyo3(get)]
     upper: Table<f32>,
-    /// (n,) uint8: 0 branch, 1 leaf, 2 grid (its whole box), 3 grid cell, 4 box of a tetrahedral cell, 5 lazy cell that no
-    /// ray has reached, 6 lazy cell that has become a subtree.
+    /// (n,) uint8: 0 branch, 1 leaf, 2 grid (its whole box), 3 grid cell, 4 box of a tetrahedral cell, 5 lazy cell that
+    /// no ray has reached, 6 lazy cell that has become a subtree.
     #[pyo3(get)]
     kind: List<u8>,
     /// (n,) uint16: depth; the root has 0.

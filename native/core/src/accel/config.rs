@@ -16,8 +16,9 @@ pub struct Config {
     pub grid_density: f64,
     /// No grid has more cells than this; 1 to 2^30.
     pub grid_most_cells: usize,
-    /// Cells of the coarse grid of a two-level one, per triangle; above 0, at most 64. This and the next as Perard-Gayot,
-    /// Kalojanov and Slusallek, "GPU Ray Tracing using Irregular Grids", CGF 36(2), 2017, have them for static scenes.
+    /// Cells of the coarse grid of a two-level one, per triangle; above 0, at most 64. This and the next as
+    /// Perard-Gayot, Kalojanov and Slusallek, "GPU Ray Tracing using Irregular Grids", CGF 36(2), 2017, have them for
+    /// static scenes.
     pub coarse_density: f64,
     /// Cells of the grids in its cells, per triangle in such a cell; above 0, at most 64.
     pub fine_density: f64,
@@ -25,8 +26,9 @@ pub struct Config {
     pub expansions: u32,
     /// No more grids stand in one another; 0 to 8.
     pub nesting: usize,
-    /// Nodes of a hierarchy that a ray visits for every doubling of the triangles, as foretold before there is one. This
-    /// and the next two fit what lines through the bunny, the dragon, Sponza and a soup do, within 15% of the nodes.
+    /// Nodes of a hierarchy that a ray visits for every doubling of the triangles, as foretold before there is one.
+    /// This and the next two fit what lines through the bunny, the dragon, Sponza and a soup do, within 15% of the
+    /// nodes.
     pub hierarchy_nodes: f64,
     /// Nodes it visits besides for every block it tests.
     pub hierarchy_block_nodes: f64,

@@ -29,8 +29,8 @@ pub struct Decision {
     pub hits: u32,
     /// The share of a grid's cells that are empty.
     pub sparseness: f32,
-    /// Index of dispersion of the hits over the strata of the box's surface; of a grid that is tested, of the references
-    /// over the occupied cells.
+    /// Index of dispersion of the hits over the strata of the box's surface; of a grid that is tested, of the
+    /// references over the occupied cells.
     pub spread: f32,
     /// Least share of hits of a uniform node.
     pub hit_threshold: f32,

@@ -5,6 +5,10 @@
 //! areas as probability. So grids and hierarchies are compared before a ray is traced, from the leaves up: a node
 //! becomes a grid where that is cheaper than the best that can be made of its children. At most [`Config::nesting`]
 //! grids stand in one another.
+//!
+//! Measured: with the default costs not one node of the bunny, the dragon, Sponza or a soup of 100,000 triangles becomes
+//! a grid, so this is the hierarchy it starts from, for 1.1 to 2 times the time of building; tracing agrees, as it finds
+//! every grid slower there.
 
 use super::{
     config::Config,

@@ -3,9 +3,9 @@
 //! heuristic finds the union cheaper than the two; then each cell's box, as far as rays are concerned, is expanded over
 //! neighbours that list nothing it does not list itself.
 //!
-//! Measured against the grid it is made of (bunny, dragon, Sponza): a quarter to a ninth of the steps of lines, 1.04 to 1.8 times
-//! the tests, and 0.65 to 1.2 times the time of a ray for 3 to 5 times the time of building. On soups, where nothing is
-//! empty, a third fewer steps are outweighed by 1.8 times the tests: 1.6 to 2 times the time.
+//! Measured against the grid it is made of (bunny, dragon, Sponza): a quarter to a ninth of the steps of lines, 1.04 to
+//! 1.8 times the tests, and 0.65 to 1.2 times the time of a ray for 3 to 5 times the time of building. On soups, where
+//! nothing is empty, a third fewer steps are outweighed by 1.8 times the tests: 1.6 to 2 times the time.
 
 use rayon::prelude::*;
 

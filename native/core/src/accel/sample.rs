@@ -130,8 +130,8 @@ impl Samples {
         samples
     }
 
-    /// `count` rays between points anywhere in a box, from the first point of each pair on: also in what is closed, such
-    /// as a hall, there are some that begin inside.
+    /// `count` rays between points anywhere in a box, from the first point of each pair on: also in what is closed,
+    /// such as a hall, there are some that begin inside.
     pub fn within(bounds: &Bounds, count: usize, seed: u64) -> Self {
         let mut samples = Self { columns: Default::default(), strata: vec![count], begin: 0.0 };
         let mut generator = Generator::new(seed, 0);
@@ -189,7 +189,8 @@ impl Samples {
         self.len() == 0
     }
 
-    /// The rays; those through a whole box are followed to both ends: a triangle on the box's own surface counts however origins are rounded.
+    /// The rays; those through a whole box are followed to both ends: a triangle on the box's own surface counts
+    /// however origins are rounded.
     ///
     /// # Errors
     /// None; the signature is that of [`Rays::new`].

@@ -1,9 +1,9 @@
 //! Grids of tetrahedra: see [`crate::traverse`]'s walk through them for how boxes are divided, and for why lists are as
 //! generous as here.
 //!
-//! Measured against cubes of equal volume (bunny, dragon, Sponza, soup): lists are 1.2 to 1.4 times as long, rays between
-//! random points take 1.3 to 1.4 times the steps and 1.5 to 1.8 times the tests, and 1.3 to 2.1 times as long. A
-//! tetrahedron of a cube's volume has 1.33 times its surface, so more of them are met by a triangle and by a ray.
+//! Measured against cubes of equal volume (bunny, dragon, Sponza, soup): lists are 1.2 to 1.4 times as long, rays
+//! between random points take 1.3 to 1.4 times the steps and 1.5 to 1.8 times the tests, and 1.3 to 2.1 times as long.
+//! A tetrahedron of a cube's volume has 1.33 times its surface, so more of them are met by a triangle and by a ray.
 
 use glam::Vec3;
 

@@ -50,8 +50,8 @@ pub fn walk<S: Simd, P: Probe, const ANY: bool>(
     }
 }
 
-/// The parameter at which the ray leaves what lies before a plane along `axis`. Behind the grid's last plane there is no
-/// cell that would make up for a rounding error, so the grid ends where its dilated box does.
+/// The parameter at which the ray leaves what lies before a plane along `axis`. Behind the grid's last plane there is
+/// no cell that would make up for a rounding error, so the grid ends where its dilated box does.
 #[inline(always)]
 pub fn crossing(plane: i32, axis: usize, frame: &Frame, grid: &Grid) -> f32 {
     let position = grid.lower[axis] + plane as f32 * grid.cell[axis];

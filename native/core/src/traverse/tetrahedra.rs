@@ -3,25 +3,25 @@
 //!
 //! Every box of a grid, scaled to the unit cube, is divided into the six tetrahedra in which the coordinates have one
 //! order (Freudenthal, "Simplizialzerlegungen von beschränkter Flachheit", Annals of Mathematics 43(3), 1942; Kuhn,
-//! "Some Combinatorial Lemmas in Topology", IBM Journal 4(5), 1960): of equal volume, each the image of any other. Their
-//! faces all lie in the planes where a coordinate, or the difference of two, is a whole number. So a tetrahedron lies
-//! wholly on one side of each of these planes, and a walk from face to face is one through six families of parallel
-//! planes, as a walk through boxes is one through three.
+//! "Some Combinatorial Lemmas in Topology", IBM Journal 4(5), 1960): of equal volume, each the image of any other.
+//! Their faces all lie in the planes where a coordinate, or the difference of two, is a whole number. So a tetrahedron
+//! lies wholly on one side of each of these planes, and a walk from face to face is one through six families of
+//! parallel planes, as a walk through boxes is one through three.
 //!
 //! Why no hit is lost. Let a ray cross the planes it meets where they are computed to be, each off by at most the
 //! position error e (below). Claim: while a walk is in a tetrahedron, up to the least crossing of the faces by which it
 //! can leave, the ray is within e of the inner side of all four faces. For a face that the ray moves towards, this is
 //! what a crossing means: it lies ahead. A face that the ray moves away from has the walk on its inner side, and a walk
-//! changes sides of a plane only by crossing a face in it. So either it began there, in the tetrahedron its first
-//! point was found in, or it has crossed that plane, at a parameter that the walk has passed; in both cases the ray was
-//! within e of the inner side then, and is farther inside by now. Errors of different steps do not add up, and crossings
-//! out of order, by rounding near an edge, only make a step of no length. Every plane is crossed at most once, in the
-//! ray's direction, so every walk ends.
+//! changes sides of a plane only by crossing a face in it. So either it began there, in the tetrahedron its first point
+//! was found in, or it has crossed that plane, at a parameter that the walk has passed; in both cases the ray was
+//! within e of the inner side then, and is farther inside by now. Errors of different steps do not add up, and
+//! crossings out of order, by rounding near an edge, only make a step of no length. Every plane is crossed at most
+//! once, in the ray's direction, so every walk ends.
 //!
 //! What is found, then, does not depend on rounding if a tetrahedron lists every triangle that reaches its inside with
 //! all four faces moved outwards by e, which [`crate::accel::tetrahedra`] does, with [`Domain::margin`] along each axis
-//! for e: by 32uR at the least. Needed are less than 10uR for a crossing (in boxes: 4u for origin and direction each, as
-//! they are scaled, and 2u for the difference and the product with the inverse), and 8uR for the sheared triangle.
+//! for e: by 32uR at the least. Needed are 10uR for a crossing (in boxes: 4u for origin and direction each,
+//! as they are scaled, and 2u for the difference and the product with the inverse), and 8uR for the sheared triangle.
 //!
 //! [`Domain::margin`]: super::frame::Domain::margin
 
