@@ -192,9 +192,9 @@ fn one_by_one(
 ) -> Result<(), espalier_core::Error> {
     const PART: usize = 8192;
     let tracer = ours.tracer();
-    pool::for_each(threads, hits.as_mut().parts(PART).enumerate(), &Job::new(), |(part, hits)| {
-        for (index, mut hit) in hits.parts(1).enumerate() {
-            tracer.closest(&rays.part(part * PART + index, 1), &mut hit)?;
+    pool::for_each(threads, hits.as_mut().parts(PART).enumerate(), &Job::new(), |(part, mut hits)| {
+        for index in 0..hits.len() {
+            hits.set(index, tracer.first(&rays.get(part * PART + index))?);
         }
         Ok(())
     })

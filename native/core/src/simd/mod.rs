@@ -24,6 +24,9 @@ pub use x86::{Avx2, Avx512};
 ///
 /// `min` and `max` return their second argument where either is not a number, as x86 does; kernels rely on that.
 pub trait Simd: Copy + Send + Sync + 'static {
+    /// Lists of ids are handled in groups of this many.
+    const GROUP: usize = 8;
+
     /// Eight numbers.
     type F32: Copy;
     /// Eight numbers in double precision.
@@ -81,14 +84,16 @@ pub trait Simd: Copy + Send + Sync + 'static {
     fn positive_f64(self, value: Self::F64) -> u32;
     /// Bit `i` is set where lane `i` is below zero.
     fn negative_f64(self, value: Self::F64) -> u32;
+    /// Ask for a value that is to be read soon; may do nothing.
+    fn prefetch<T>(self, value: &T);
     /// Copy the ids whose mask has bit `bit` to the front of `out`, in order, and count them.
     ///
-    /// All slices have the same length, a multiple of [`GROUP`]; what stands in `out` behind the copies is unspecified.
+    /// All slices have the same length, a multiple of [`Simd::GROUP`]; what stands in `out` behind the copies is unspecified.
     fn compact(self, masks: &[u8], bit: u32, ids: &[u16], out: &mut [u16]) -> usize;
 }
 
-/// Lists of ids are handled in groups of this many.
-pub const GROUP: usize = 32;
+/// The largest [`Simd::GROUP`].
+pub const MOST_GROUP: usize = 32;
 
 /// Work written once for every instruction set. Implementations must be `#[inline(always)]`, and so must all that they
 /// call in their inner loops: a closure, or a function that takes one, is compiled without the instruction set and

@@ -205,6 +205,8 @@ impl Simd for Neon {
         quarter_bits(self, set)
     }
     #[inline(always)]
+    fn prefetch<T>(self, _: &T) {}
+    #[inline(always)]
     fn compact(self, masks: &[u8], bit: u32, ids: &[u16], out: &mut [u16]) -> usize {
         const WEIGHTS: [u8; 8] = [1, 2, 4, 8, 16, 32, 64, 128];
         let mut count = 0;

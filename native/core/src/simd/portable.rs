@@ -125,6 +125,8 @@ impl Simd for Portable {
         bits(|i| value[i] < 0.0)
     }
     #[inline(always)]
+    fn prefetch<T>(self, _: &T) {}
+    #[inline(always)]
     fn compact(self, masks: &[u8], bit: u32, ids: &[u16], out: &mut [u16]) -> usize {
         let mut count = 0;
         for (mask, id) in masks.iter().zip(ids) {

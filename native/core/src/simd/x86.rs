@@ -2,7 +2,7 @@
 
 use std::arch::x86_64::*;
 
-use super::{GROUP, Kernel, Simd, shuffles::SHUFFLES};
+use super::{Kernel, MOST_GROUP, Simd, shuffles::SHUFFLES};
 
 /// Proof that the processor has AVX2, FMA, BMI1, BMI2, LZCNT and POPCNT.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -156,6 +156,15 @@ macro_rules! arithmetic {
             unsafe { _mm256_max_ps(a, b) }
         }
         #[inline(always)]
+        fn prefetch<T>(self, value: &T) {
+            const LINE: usize = 64;
+            let first: *const i8 = std::ptr::from_ref(value).cast();
+            for offset in (0..size_of::<T>()).step_by(LINE) {
+                // SAFETY: a prefetch reads nothing and faults nowhere; the sum stays within the value.
+                unsafe { _mm_prefetch::<_MM_HINT_T0>(first.add(offset)) };
+            }
+        }
+        #[inline(always)]
         fn widen(self, value: __m256) -> [__m256d; 2] {
             // SAFETY: as for `splat`.
             unsafe {
@@ -258,6 +267,7 @@ impl Simd for Avx2 {
 }
 
 impl Simd for Avx512 {
+    const GROUP: usize = MOST_GROUP;
     type F32 = __m256;
     type F64 = [__m256d; 2];
 
@@ -284,8 +294,8 @@ impl Simd for Avx512 {
     #[inline(always)]
     fn compact(self, masks: &[u8], bit: u32, ids: &[u16], out: &mut [u16]) -> usize {
         let mut count = 0;
-        for (masks, ids) in masks.chunks_exact(GROUP).zip(ids.chunks_exact(GROUP)) {
-            let out = &mut out[count..count + GROUP];
+        for (masks, ids) in masks.chunks_exact(MOST_GROUP).zip(ids.chunks_exact(MOST_GROUP)) {
+            let out = &mut out[count..count + MOST_GROUP];
             // SAFETY: a token exists only where AVX-512 F, BW, VL and VBMI2 were detected; `masks` has 32 readable
             // bytes, `ids` 64 readable and `out` 64 writable ones, and no access asks for alignment.
             unsafe {

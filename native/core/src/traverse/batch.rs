@@ -3,6 +3,7 @@
 use std::{cell::RefCell, marker::PhantomData};
 
 use super::{
+    answers::Answers,
     frame::Frame,
     kernel::{self, Entry},
     probe::{Counts, Probe, Silent},
@@ -16,7 +17,7 @@ use crate::{
     accel::structure::Structure,
     job::Phase,
     pool,
-    ray::{Hit, HitsMut, MISS, Rays},
+    ray::{Hit, HitsMut, MISS, Ray, Rays},
     simd::{Kernel, Level, Simd},
     triangle::LANES,
 };
@@ -68,19 +69,29 @@ impl<'a> Tracer<'a> {
     pub(crate) fn probed<P: Probe + Default>(self, rays: &Rays<'_>, probes: &mut [P]) -> Result<(), Error> {
         assert_eq!(rays.len(), probes.len());
         let take = |index: usize, _: &Frame, _: Hit, seen: P| probes[index] = seen;
-        self.with_room(|room| {
-            self.level.run(Singles::<_, _, false> { tracer: self, rays, take, room, probe: PhantomData })
-        })
+        self.with_room(|room| self.level.run(Singles { tracer: self, rays, take, room, probe: PhantomData }))
+    }
+
+    /// The closest hit of one ray, on the calling thread: the cheapest way to ask for just one.
+    ///
+    /// # Errors
+    /// [`Error::Ray`] where the ray is unusable.
+    pub fn first(self, ray: &Ray) -> Result<Hit, Error> {
+        let frame = Frame::new(ray, &self.structure.domain).ok_or_else(|| ray.fault(0))?;
+        let hit = self.with_room(|room| self.level.run(One::<false> { tracer: self, frame: &frame, room }));
+        Ok(in_ray_units(&frame, hit))
     }
 
     fn silent<const ANY: bool>(self, rays: &Rays<'_>, mut take: impl FnMut(usize, &Frame, Hit)) -> Result<(), Error> {
         self.with_room(|room| {
             if rays.len() >= LEAST_STREAM {
-                self.level.run(Streams::<_, ANY> { tracer: self, rays, take, room })
-            } else {
-                let take = |index: usize, frame: &Frame, hit: Hit, _: Silent| take(index, frame, hit);
-                self.level.run(Singles::<_, _, ANY> { tracer: self, rays, take, room, probe: PhantomData })
+                return self.level.run(Streams::<_, ANY> { tracer: self, rays, take, room });
             }
+            for index in 0..rays.len() {
+                let frame = rays.frame(index, &self.structure.domain)?;
+                take(index, &frame, self.level.run(One::<ANY> { tracer: self, frame: &frame, room }));
+            }
+            Ok(())
         })
     }
 
@@ -110,8 +121,16 @@ fn in_ray_units(frame: &Frame, hit: Hit) -> Hit {
     if hit.primitive == MISS { Hit::MISS } else { Hit { t: frame.parameter(hit.t), ..hit } }
 }
 
-/// Rays that walk alone, and what to do with the index, frame, hit (in the frame's units) and probe of each.
-struct Singles<'a, F, P, const ANY: bool> {
+/// A ray that walks alone; the result is in the frame's units.
+struct One<'a, const ANY: bool> {
+    tracer: Tracer<'a>,
+    frame: &'a Frame,
+    room: &'a mut Room,
+}
+
+/// Rays that walk alone under the eyes of probes, and what to do with the index, frame, hit (in the frame's units) and
+/// probe of each.
+struct Singles<'a, F, P> {
     tracer: Tracer<'a>,
     rays: &'a Rays<'a>,
     take: F,
@@ -137,7 +156,26 @@ macro_rules! pick_instance {
     };
 }
 
-impl<F: FnMut(usize, &Frame, Hit, P), P: Probe + Default, const ANY: bool> Kernel for Singles<'_, F, P, ANY> {
+impl<const ANY: bool> Kernel for One<'_, ANY> {
+    type Output = Hit;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> Self::Output {
+        pick_instance!(self, simd)
+    }
+}
+
+impl<const ANY: bool> One<'_, ANY> {
+    #[inline(always)]
+    fn each<S: Simd, const GRIDS: bool>(self, simd: S) -> Hit {
+        let Tracer { structure, mesh, .. } = self.tracer;
+        let (frame, stack) = (self.frame, &mut self.room.stack);
+        kernel::trace::<S, Silent, GRIDS, ANY>(simd, structure, mesh, frame, stack, &mut Silent)
+            .answer::<ANY>(frame, mesh)
+    }
+}
+
+impl<F: FnMut(usize, &Frame, Hit, P), P: Probe + Default> Kernel for Singles<'_, F, P> {
     type Output = Result<(), Error>;
 
     #[inline(always)]
@@ -155,7 +193,7 @@ impl<F: FnMut(usize, &Frame, Hit), const ANY: bool> Kernel for Streams<'_, F, AN
     }
 }
 
-impl<F: FnMut(usize, &Frame, Hit, P), P: Probe + Default, const ANY: bool> Singles<'_, F, P, ANY> {
+impl<F: FnMut(usize, &Frame, Hit, P), P: Probe + Default> Singles<'_, F, P> {
     #[inline(always)]
     fn each<S: Simd, const GRIDS: bool>(mut self, simd: S) -> Result<(), Error> {
         let Tracer { structure, mesh, .. } = self.tracer;
@@ -163,8 +201,8 @@ impl<F: FnMut(usize, &Frame, Hit, P), P: Probe + Default, const ANY: bool> Singl
             let frame = self.rays.frame(index, &structure.domain)?;
             let mut probe = P::default();
             let stack = &mut self.room.stack;
-            let best = kernel::trace::<S, P, GRIDS, ANY>(simd, structure, mesh, &frame, stack, &mut probe);
-            (self.take)(index, &frame, best.answer::<ANY>(&frame, mesh), probe);
+            let best = kernel::trace::<S, P, GRIDS, false>(simd, structure, mesh, &frame, stack, &mut probe);
+            (self.take)(index, &frame, best.answer::<false>(&frame, mesh), probe);
         }
         Ok(())
     }
@@ -173,40 +211,81 @@ impl<F: FnMut(usize, &Frame, Hit, P), P: Probe + Default, const ANY: bool> Singl
 impl<F: FnMut(usize, &Frame, Hit), const ANY: bool> Streams<'_, F, ANY> {
     #[inline(always)]
     fn each<S: Simd, const GRIDS: bool>(mut self, simd: S) -> Result<(), Error> {
+        let Tracer { structure, mesh, .. } = self.tracer;
         self.room.bins.iter_mut().for_each(Bin::clear);
-        let count = self.rays.len();
-        for first in (0..count).step_by(LANES) {
-            let mut frames = [Frame::zeroed(); LANES];
-            let lanes = LANES.min(count - first);
-            if lanes < LANES || !setup::eight(simd, self.rays, first, &self.tracer.structure.domain, &mut frames) {
-                for lane in 0..lanes {
-                    frames[lane] = self.rays.frame(first + lane, &self.tracer.structure.domain)?;
-                }
-            }
-            for lane in 0..lanes {
-                let octant = frames[lane].octant();
-                self.room.bins[octant].push(first + lane, frames[lane]);
-                if self.room.bins[octant].is_full() {
-                    self.flush::<S, GRIDS>(simd, octant);
-                }
-            }
-        }
-        for octant in 0..8 {
-            self.flush::<S, GRIDS>(simd, octant);
+        let mut next = 0;
+        while let Some(octant) = self.fill(simd, &mut next)? {
+            let Room { stack, bins, lists } = &mut *self.room;
+            stream::trace::<S, GRIDS, ANY>(simd, structure, mesh, octant, &mut bins[octant], lists, stack);
+            self.answer(simd, octant);
+            self.room.bins[octant].clear();
         }
         Ok(())
     }
 
+    /// Sort rays from `next` on into bins until one is full or no ray is left, and tell which bin to trace.
     #[inline(always)]
-    fn flush<S: Simd, const GRIDS: bool>(&mut self, simd: S, octant: usize) {
-        let Tracer { structure, mesh, .. } = self.tracer;
-        let Room { stack, bins, lists } = &mut *self.room;
-        let bin = &mut bins[octant];
-        stream::trace::<S, GRIDS, ANY>(simd, structure, mesh, octant, bin, lists, stack);
-        for (index, frame, best) in bin.rays() {
-            (self.take)(index, frame, best.answer::<ANY>(frame, mesh));
+    fn fill<S: Simd>(&mut self, simd: S, next: &mut usize) -> Result<Option<usize>, Error> {
+        let count = self.rays.len();
+        let mut full = self.room.bins.iter().position(Bin::is_full);
+        while full.is_none() && *next < count {
+            let mut frames = [Frame::zeroed(); LANES];
+            let lanes = LANES.min(count - *next);
+            self.frames(simd, *next, &mut frames[..lanes])?;
+            for lane in 0..lanes {
+                let octant = frames[lane].octant();
+                self.room.bins[octant].push(*next + lane, &frames[lane]);
+                if self.room.bins[octant].is_full() {
+                    full = Some(octant);
+                }
+            }
+            *next += lanes;
         }
-        bin.clear();
+        Ok(full.or_else(|| self.room.bins.iter().position(|bin| !bin.is_empty())))
+    }
+
+    /// The frames of the rays from `first` on.
+    #[inline(always)]
+    fn frames<S: Simd>(&self, simd: S, first: usize, frames: &mut [Frame]) -> Result<(), Error> {
+        let domain = &self.tracer.structure.domain;
+        if let Some(eight) = frames.first_chunk_mut()
+            && setup::eight(simd, self.rays, first, domain, eight)
+        {
+            return Ok(());
+        }
+        for (lane, frame) in frames.iter_mut().enumerate() {
+            *frame = self.rays.frame(first + lane, domain)?;
+        }
+        Ok(())
+    }
+
+    /// Tell what the rays of a bin hit.
+    #[inline(always)]
+    fn answer<S: Simd>(&mut self, simd: S, octant: usize) {
+        let bin = &self.room.bins[octant];
+        if !ANY {
+            bin.warm(simd, self.tracer.mesh);
+        }
+        let (mut answers, mut slot) = (Answers::EMPTY, 0);
+        while slot < bin.len() {
+            while slot < bin.len() && !answers.is_full() {
+                let (index, frame, best) = bin.ray(slot);
+                if ANY || best.primitive == MISS {
+                    (self.take)(index, frame, Hit { primitive: best.primitive, ..Hit::MISS });
+                } else {
+                    answers.push(slot, frame, self.tracer.mesh, best.primitive);
+                }
+                slot += 1;
+            }
+            if ANY {
+                continue;
+            }
+            let (hits, count) = answers.take(simd);
+            for &(slot, hit) in &hits[..count] {
+                let (index, frame, _) = bin.ray(slot);
+                (self.take)(index, frame, hit);
+            }
+        }
     }
 }
 

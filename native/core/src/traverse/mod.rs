@@ -1,9 +1,10 @@
 //! Finding what rays hit: one loop over branches, leaves and grids, and the batches that feed it.
 
+mod answers;
 mod batch;
 mod crossing;
 mod dda;
-#[allow(dead_code)] // Until the traversers that come next call it.
+#[allow(dead_code)] // Whoever knows its triangle needs no verdict; the traversers that come next do.
 mod exact;
 pub mod frame;
 mod irregular;
