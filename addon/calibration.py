@@ -17,7 +17,7 @@ from . import native
 
 @cache
 def cost_constants() -> dict[str, float]:
-    """Nanoseconds by setting, as `espalier_rt.calibrate` measures them, for "hybrid-cost".
+    """Nanoseconds by setting, as `espalier_rt.calibrate` measures them, for "hybrid".
 
     Measured anew where the machine, the instruction set or Espalier's version is another than in the file. Where the
     file cannot be written, they hold until Blender ends.
@@ -40,7 +40,7 @@ def cache_file() -> Path:
 
 
 def _names(rt: ModuleType) -> list[str]:
-    return [name for name in rt.default_config("hybrid-cost") if name.endswith("_ns")]
+    return [name for name in rt.default_config("hybrid") if name.endswith("_ns")]
 
 
 def _read(path: Path) -> dict[str, Any]:

@@ -21,7 +21,6 @@ SHORT_LABELS = {
     "hapala": "Tested",
     "fellner": "Nested",
     "hybrid-sampled": "Sampled",
-    "hybrid-cost": "Cost",
     "hybrid": "Hybrid",
 }
 """What the methods are called where there is little room."""

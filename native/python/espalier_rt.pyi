@@ -94,7 +94,7 @@ class Accelerator:
     @staticmethod
     def build(
         mesh: Mesh,
-        method: str = "hybrid-sampled",
+        method: str = "hybrid",
         config: Mapping[str, Any] | None = None,
         threads: int = 0,
         job: Job | None = None,

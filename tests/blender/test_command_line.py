@@ -23,7 +23,6 @@ def test_compare_writes_pictures_and_report(blender: Blender, blend: Path, tmp_p
         "lbvh",
         "grid",
         "hybrid-sampled",
-        "hybrid-cost",
         "hybrid",
     ]
     assert report["scene"]["instances"] >= 3

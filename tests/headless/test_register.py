@@ -10,7 +10,7 @@ import espalier
 
 
 def test_settings_are_on_the_scene(scene):
-    assert scene.espalier.method == "hybrid-sampled"
+    assert scene.espalier.method == "hybrid"
     assert scene.espalier.methods == {
         "bvh-median",
         "bvh-sah",
@@ -18,7 +18,6 @@ def test_settings_are_on_the_scene(scene):
         "lbvh",
         "grid",
         "hybrid-sampled",
-        "hybrid-cost",
         "hybrid",
     }
 

@@ -19,7 +19,7 @@ def cache_file(tmp_path, monkeypatch):
 
 def test_calibration_measures_every_cost_of_the_model():
     costs = rt.calibrate()
-    assert set(costs) == {name for name in rt.default_config("hybrid-cost") if name.endswith("_ns")}
+    assert set(costs) == {name for name in rt.default_config("hybrid") if name.endswith("_ns")}
     assert all(0.0 < value < 1e5 for value in costs.values())
 
 

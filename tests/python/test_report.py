@@ -22,7 +22,7 @@ REPORT = Report(
     threads=2,
     machine="Some processor, 2 cores",
     export_ms=31.25,
-    methods=(METHOD, replace(METHOD, name="hybrid-cost", build_ms=50.0, trace_s=0.125, mrays_per_s=8.0, bytes=2000)),
+    methods=(METHOD, replace(METHOD, name="hybrid", build_ms=50.0, trace_s=0.125, mrays_per_s=8.0, bytes=2000)),
     cycles=CyclesSummary(0.5, 1.25, 1.75),
     difference=DifferenceSummary(0.125, 0.0625),
 )
@@ -71,7 +71,7 @@ def test_json_has_exactly_the_schema() -> None:
     assert list(read) == list(SCHEMA)
     assert read["schema_version"] == 1
     assert read["scene"] == {"name": "Garden", "triangles": 871414, "vertices": 437645, "instances": 12}
-    assert read["methods"][1]["name"] == "hybrid-cost"
+    assert read["methods"][1]["name"] == "hybrid"
 
 
 def test_without_cycles_its_parts_are_null() -> None:
@@ -90,7 +90,7 @@ def test_the_table_has_a_row_a_method_and_marks_the_best() -> None:
     lines = REPORT.table().splitlines()
     assert lines[0] == "Garden: 871,414 triangles, 12 instances; 1000 x 800 pixels, 1 sample, 2 threads"
     grid = next(line for line in lines if "(grid)" in line)
-    hybrid = next(line for line in lines if "(hybrid-cost)" in line)
+    hybrid = next(line for line in lines if "(hybrid)" in line)
     assert [cell for cell in grid.split() if cell.endswith("*")] == ["12.5*"]
     assert [cell for cell in hybrid.split() if cell.endswith("*")] == ["0.125*", "8.00*", "KiB*"]
     assert "Cycles: 0.500 s synchronisation and BVH, 1.250 s rendering, 1.750 s in all" in lines

@@ -114,10 +114,10 @@ def test_no_method_is_a_named_error():
 
 
 def test_the_rays_expected_are_those_of_the_frame_unless_said(monkeypatch):
-    run = Run(plane(resolution=(10, 20)), ["hybrid-cost"], Options(samples=3))
-    assert run._config("hybrid-cost")["expected_rays"] == 600.0
-    run = Run(plane(), ["hybrid-cost"], Options(expected_rays=5e6))
-    assert run._config("hybrid-cost")["expected_rays"] == 5e6
+    run = Run(plane(resolution=(10, 20)), ["hybrid"], Options(samples=3))
+    assert run._config("hybrid")["expected_rays"] == 600.0
+    run = Run(plane(), ["hybrid"], Options(expected_rays=5e6))
+    assert run._config("hybrid")["expected_rays"] == 5e6
 
 
 def test_two_runs_and_any_number_of_threads_give_the_same_picture():

@@ -128,7 +128,7 @@ def test_diffuse_rays_leave_the_surface_cosine_distributed(scene: rays.Scene) ->
         ("bvh-sah+reinsert", "bvh"),
         ("sbvh", "bvh"),
         ("grid-two-level", "grid"),
-        ("hybrid-cost", "hybrid"),
+        ("hybrid-sampled", "hybrid"),
         ("hapala", "hybrid"),
         ("fellner", "hybrid"),
         ("embree", "reference"),

@@ -22,19 +22,23 @@ use common::RayBatch;
 fn main() {
     let mut arguments = std::env::args().skip(1).peekable();
     let (mut methods, mut config) = (Method::ALL.to_vec(), Config::default());
-    let mut threads = 0;
+    let (mut threads, mut totals) = (0, None);
     while let Some(option) = arguments.next_if(|argument| argument.starts_with("--")) {
         let value = arguments.next().expect("a value");
         match option.as_str() {
             "--methods" => methods = value.split(',').map(|name| Method::from_name(name).unwrap()).collect(),
             "--threads" => threads = value.parse().unwrap(),
             "--calibrate" => config.cost = calibrated(&value),
+            "--totals" => totals = Some(value.split(',').map(|count| count.parse().unwrap()).collect::<Vec<f64>>()),
             "--set" => set(&mut config, value.split_once('=').expect("key=value")),
             _ => panic!("unknown option {option}"),
         }
     }
     for name in arguments {
-        survey(&name, &methods, &config, threads);
+        match &totals {
+            Some(counts) => tell_totals(&name, &methods, &config, counts),
+            None => survey(&name, &methods, &config, threads),
+        }
     }
 }
 
@@ -126,6 +130,44 @@ fn survey(name: &str, methods: &[Method], config: &Config, threads: usize) {
     }
 }
 
+/// Milliseconds of building on one thread and then tracing so many rays, as JSON, a line for each method and number of
+/// rays: half of the rays come from the camera, the others leave its hit points.
+fn tell_totals(name: &str, methods: &[Method], config: &Config, counts: &[f64]) {
+    let mesh = Arc::new(load(name));
+    let sets = [camera(&mesh), bounce(&mesh)];
+    for &expected_rays in counts {
+        for &method in methods {
+            let config = Config { expected_rays, ..config.clone() };
+            let rounds = if expected_rays > 2e6 { 1 } else { 3 };
+            let [build, trace] = (0..rounds)
+                .map(|_| total(&mesh, method, &config, &sets))
+                .min_by(|a, b| (a[0] + a[1]).total_cmp(&(b[0] + b[1])))
+                .unwrap();
+            println!(
+                "{{\"mesh\": \"{name}\", \"triangles\": {}, \"rays\": {expected_rays}, \"method\": \"{}\", \"build_ms\": {build:.3}, \"trace_ms\": {trace:.3}}}",
+                mesh.triangles().len(),
+                method.name()
+            );
+        }
+    }
+}
+
+fn total(mesh: &Arc<Mesh>, method: Method, config: &Config, sets: &[RayBatch; 2]) -> [f64; 2] {
+    let start = process_ns();
+    let accelerator = Accelerator::build(mesh.clone(), method, config, 1, &Job::new()).unwrap();
+    let built = process_ns();
+    for batch in sets {
+        let mut left = (config.expected_rays / 2.0) as usize;
+        while left > 0 {
+            let rays = batch.rays().part(0, left);
+            let mut hits = Hits::misses(rays.len());
+            accelerator.closest(&rays, hits.as_mut(), 1, &Job::new()).unwrap();
+            left -= rays.len();
+        }
+    }
+    [built - start, process_ns() - built].map(|nanoseconds| nanoseconds * 1e-6)
+}
+
 /// How many decisions of each size went which way.
 fn verdicts(accelerator: &Accelerator) {
     let decisions = accelerator.decisions();
@@ -158,6 +200,12 @@ fn processor_ms() -> u64 {
     let line = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
     let fields = line.rsplit(") ").next().unwrap_or_default().split(' ');
     fields.skip(11).take(2).filter_map(|ticks| ticks.parse::<u64>().ok()).sum::<u64>() * 10
+}
+
+/// What this process has used so far, in nanoseconds of processor time.
+fn process_ns() -> f64 {
+    let now = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
+    now.tv_sec as f64 * 1e9 + now.tv_nsec as f64
 }
 
 /// What this thread has used so far, in nanoseconds of processor time, so that other work on the machine matters

@@ -17,7 +17,7 @@ use espalier_core::{
     },
 };
 
-const HYBRIDS: [Method; 2] = [Method::HybridSampled, Method::HybridCost];
+const HYBRIDS: [Method; 2] = [Method::HybridSampled, Method::Hybrid];
 
 fn mesh((vertices, triangles): (Vec<glam::Vec3>, Vec<[u32; 3]>)) -> Arc<Mesh> {
     Arc::new(Mesh::new(vertices, triangles).unwrap())
@@ -64,9 +64,9 @@ fn the_sampled_verdict_follows_from_its_evidence() {
 
 #[test]
 fn the_expected_cost_decides() {
-    let config = Config { grid_least_triangles: 40, grid_most_triangles: 4000, ..eager() };
+    let config = Config { grid_least_triangles: 40, grid_most_triangles: 4000, expected_rays: 1e12, ..eager() };
     for mesh in [mesh(soup(9000, 0.05)), mesh(icosphere(4))] {
-        let accelerator = build(&mesh, Method::HybridCost, &config, 2);
+        let accelerator = build(&mesh, Method::Hybrid, &config, 2);
         for decision in accelerator.decisions().iter().filter(|decision| decision.rays > 0) {
             let gain = decision.cost_bvh * config.grid_gain as f32;
             assert!(decision.cost_grid > 0.0 && decision.cost_bvh > 0.0);
@@ -78,7 +78,7 @@ fn the_expected_cost_decides() {
 #[test]
 fn no_grid_is_built_for_rays_that_never_come() {
     let config = Config { expected_rays: 0.0, ..eager() };
-    let accelerator = build(&mesh(soup(2000, 0.1)), Method::HybridCost, &config, 2);
+    let accelerator = build(&mesh(soup(2000, 0.1)), Method::Hybrid, &config, 2);
     assert_eq!(accelerator.census().grids, 0);
 }
 
@@ -86,7 +86,7 @@ fn no_grid_is_built_for_rays_that_never_come() {
 fn every_grid_was_decided_on() {
     for method in HYBRIDS {
         for mesh in [mesh(soup(2000, 0.1)), mesh(icosphere(3))] {
-            let accelerator = build(&mesh, method, &eager(), 2);
+            let accelerator = build(&mesh, method, &Config { expected_rays: 1e12, ..eager() }, 2);
             let grids = count(accelerator.decisions(), Verdict::Grid);
             assert!(grids > 0, "{method:?}");
             assert_eq!(grids, accelerator.census().grids);

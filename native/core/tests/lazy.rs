@@ -12,7 +12,7 @@ use espalier_core::{
 use glam::Vec3;
 
 fn lazy(mesh: &Arc<Mesh>, threads: usize) -> Accelerator {
-    let config = Config { expected_rays: 1e4, ..Config::default() };
+    let config = Config { expected_rays: 0.0, ..Config::default() };
     Accelerator::build(mesh.clone(), Method::Hybrid, &config, threads, &Job::new()).unwrap()
 }
 

@@ -51,7 +51,7 @@ impl Accelerator {
     ///
     /// Raises ConfigError for an unknown method or setting or a value out of range, Cancelled, and OutOfMemory.
     #[staticmethod]
-    #[pyo3(signature = (mesh, method="hybrid-sampled", config=None, threads=0, job=None))]
+    #[pyo3(signature = (mesh, method="hybrid", config=None, threads=0, job=None))]
     fn build(
         mesh: &Bound<'_, Mesh>,
         method: &str,

@@ -2,7 +2,7 @@
 
 use espalier_core::{
     Config, Method,
-    accel::method::{Hierarchy, Judgement, Lattice, Recipe},
+    accel::method::{Hierarchy, Lattice, Recipe},
 };
 use pyo3::{
     prelude::*,
@@ -39,18 +39,18 @@ impl Readers {
         let recipe = method.recipe();
         match self {
             Self::All => true,
-            Self::Sah => matches!(recipe, Recipe::Hierarchy(Hierarchy::Sah) | Recipe::Hapala | Recipe::Fellner),
+            Self::Sah => matches!(
+                recipe,
+                Recipe::Hierarchy(Hierarchy::Sah) | Recipe::Hapala | Recipe::Fellner | Recipe::Cheapest
+            ),
             Self::Grids => !matches!(recipe, Recipe::Hierarchy(_)),
-            Self::Samples => matches!(recipe, Recipe::Hybrid(_) | Recipe::Hapala),
-            Self::Window => matches!(recipe, Recipe::Hybrid(_) | Recipe::Fellner),
-            Self::Sampled => recipe == Recipe::Hybrid(Judgement::Sampled),
-            Self::Gain => matches!(recipe, Recipe::Hybrid(Judgement::ExpectedCost) | Recipe::Fellner),
+            Self::Samples => matches!(recipe, Recipe::Sampled | Recipe::Cheapest | Recipe::Hapala),
+            Self::Window => matches!(recipe, Recipe::Sampled | Recipe::Cheapest | Recipe::Fellner),
+            Self::Sampled => recipe == Recipe::Sampled,
+            Self::Gain => matches!(recipe, Recipe::Cheapest | Recipe::Fellner),
             Self::Cost => matches!(
                 recipe,
-                Recipe::Hybrid(Judgement::ExpectedCost)
-                    | Recipe::Lattice(Lattice::Irregular)
-                    | Recipe::Hapala
-                    | Recipe::Fellner
+                Recipe::Cheapest | Recipe::Lattice(Lattice::Irregular) | Recipe::Hapala | Recipe::Fellner
             ),
             Self::Recipe(wanted) => recipe == wanted,
         }

@@ -29,7 +29,7 @@ pub fn default_config<'py>(py: Python<'py>, method: &str) -> PyResult<Bound<'py,
 }
 
 /// What the steps of a traversal take on this machine, in nanoseconds, measured on one thread in a fraction of a second:
-/// the settings that "hybrid-cost" decides by, for `Accelerator.build`'s `config`.
+/// the settings that "hybrid" decides by, for `Accelerator.build`'s `config`.
 ///
 /// The result varies a little from call to call. Measure once a machine and keep it: equal settings give equal trees.
 /// Raises OutOfMemory.

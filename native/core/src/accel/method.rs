@@ -27,9 +27,7 @@ pub enum Method {
     Fellner,
     /// The paper's hybrid: sampled rays decide which nodes become grids.
     HybridSampled,
-    /// The same tree and samples, decided by expected cost.
-    HybridCost,
-    /// A uniform grid divides the triangles, and what is in a cell becomes a subtree when the first ray reaches it.
+    /// Lazy cells of a grid, a quick hierarchy or a good one with grids in it, by least expected cost.
     Hybrid,
 }
 
@@ -40,15 +38,6 @@ pub enum Hierarchy {
     Median,
     /// [`sah`](super::sah)
     Sah,
-}
-
-/// Who decides which nodes of a median tree become grids.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Judgement {
-    /// [`hybrid::Sampled`](super::hybrid::Sampled)
-    Sampled,
-    /// [`expected::ExpectedCost`](super::expected::ExpectedCost)
-    ExpectedCost,
 }
 
 /// Which kind of grid stands over everything.
@@ -79,10 +68,10 @@ pub enum Recipe {
     Hapala,
     /// [`fellner`](super::fellner)
     Fellner,
-    /// A median tree, some of whose nodes become grids.
-    Hybrid(Judgement),
-    /// A hierarchy of [lazy cells](super::instant).
-    Lazy,
+    /// A median tree, some of whose nodes become [grids](super::hybrid::Sampled).
+    Sampled,
+    /// What is expected to [cost least](super::choice).
+    Cheapest,
 }
 
 /// All that there is to know about a method.
@@ -110,9 +99,8 @@ const ROWS: &[Row] = &[
     row(Method::GridTetrahedral, "grid-tetrahedral", Recipe::Lattice(Lattice::Tetrahedral), 1),
     row(Method::Hapala, "hapala", Recipe::Hapala, 3),
     row(Method::Fellner, "fellner", Recipe::Fellner, 3),
-    row(Method::HybridSampled, "hybrid-sampled", Recipe::Hybrid(Judgement::Sampled), 3),
-    row(Method::HybridCost, "hybrid-cost", Recipe::Hybrid(Judgement::ExpectedCost), 3),
-    row(Method::Hybrid, "hybrid", Recipe::Lazy, 1),
+    row(Method::HybridSampled, "hybrid-sampled", Recipe::Sampled, 3),
+    row(Method::Hybrid, "hybrid", Recipe::Cheapest, 3),
 ];
 
 const fn row(method: Method, name: &'static str, recipe: Recipe, passes: u64) -> Row {

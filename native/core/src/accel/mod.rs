@@ -7,6 +7,7 @@ pub mod census;
 pub mod check;
 mod check_lattice;
 mod check_lazy;
+pub mod choice;
 pub mod clustered;
 pub mod clusters;
 pub mod config;
@@ -55,7 +56,7 @@ use self::{
     config::Config,
     decision::Decision,
     grid::BuiltGrid,
-    method::{Hierarchy, Judgement, Recipe},
+    method::{Hierarchy, Recipe},
     structure::Structure,
     tree::{Kind, Tree, TreeNode},
 };
@@ -186,7 +187,7 @@ struct Builder<'a> {
 impl Builder<'_> {
     fn structure(&mut self, recipe: Recipe) -> Result<Structure, Error> {
         let tree = match recipe {
-            Recipe::Lazy => return self.timed("cells", |this| instant::build(this.mesh, this.job)),
+            Recipe::Cheapest => return self.cheapest(),
             Recipe::Hierarchy(hierarchy) => self.hierarchy(hierarchy)?,
             Recipe::Clustered => return self.clustered(),
             Recipe::Linear => return self.linear(),
@@ -194,8 +195,7 @@ impl Builder<'_> {
             Recipe::Lattice(lattice) => return self.lattice(lattice),
             Recipe::Hapala => self.grid_or_hierarchy()?,
             Recipe::Fellner => self.fellner()?,
-            Recipe::Hybrid(Judgement::Sampled) => self.hybrid(&hybrid::Sampled)?,
-            Recipe::Hybrid(Judgement::ExpectedCost) => self.hybrid(&expected::ExpectedCost)?,
+            Recipe::Sampled => self.hybrid(Hierarchy::Median, &hybrid::Sampled)?,
         };
         self.timed("pack", |this| pack::pack(&tree, this.mesh, this.job))
     }
@@ -226,8 +226,24 @@ impl Builder<'_> {
         self.timed("write", |this| forest::write(&top, &drafts, this.mesh, this.job))
     }
 
-    fn hybrid(&mut self, judge: &impl hybrid::Judge) -> Result<Tree, Error> {
-        let tree = self.hierarchy(Hierarchy::Median)?;
+    fn cheapest(&mut self) -> Result<Structure, Error> {
+        let triangles = self.mesh.solid().len();
+        let builder = choice::estimates(triangles, self.config)[0].builder;
+        // Progress was promised for the builder that goes through all triangles most often.
+        self.job.advance(builder.passes_saved() * triangles as u64);
+        match builder {
+            choice::Builder::Lazy => self.timed("cells", |this| instant::build(this.mesh, this.job)),
+            choice::Builder::Linear => self.linear(),
+            choice::Builder::Clustered => self.clustered(),
+            choice::Builder::Complete => {
+                let tree = self.hybrid(Hierarchy::Sah, &expected::ExpectedCost)?;
+                self.timed("pack", |this| pack::pack(&tree, this.mesh, this.job))
+            }
+        }
+    }
+
+    fn hybrid(&mut self, hierarchy: Hierarchy, judge: &impl hybrid::Judge) -> Result<Tree, Error> {
+        let tree = self.hierarchy(hierarchy)?;
         let (tree, decisions) =
             self.timed("verdicts", |this| hybrid::decide(tree, this.mesh, this.config, judge, this.job))?;
         self.decisions = decisions;

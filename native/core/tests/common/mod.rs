@@ -222,6 +222,8 @@ pub fn nested() -> Config {
 pub fn variant(name: &str) -> (Method, Config) {
     let (wanted, config) = match name.split_once('_') {
         Some(("eager", judge)) => (format!("hybrid_{judge}"), eager()),
+        Some(("few", method)) => (method.to_owned(), Config { expected_rays: 0.0, ..Config::default() }),
+        Some(("many", method)) => (method.to_owned(), Config { expected_rays: 1e12, ..eager() }),
         Some(("nested", method)) => (method.to_owned(), nested()),
         Some(("tried", method)) => (method.to_owned(), Config { expected_rays: 0.0, ..Config::default() }),
         _ => (name.to_owned(), Config::default()),
@@ -245,7 +247,8 @@ macro_rules! every_walk {
     ($tests:tt) => {
         $crate::every_walk!(@variants $tests;
             bvh_median, bvh_sah, bvh_clusters, lbvh, grid, grid_two_level, grid_irregular, grid_tetrahedral, hapala,
-            tried_hapala, fellner, nested_fellner, hybrid_sampled, hybrid_cost, hybrid, eager_sampled, eager_cost);
+            tried_hapala, fellner, nested_fellner, hybrid_sampled, hybrid, eager_sampled, few_hybrid,
+            many_hybrid);
     };
     (@variants $tests:tt; $($variant:ident),+) => {
         #[test]
