@@ -4,8 +4,8 @@
 
 use glam::Vec3A;
 
-use super::record::Record;
-use crate::{bounds::BoundsA, triangle::LANES};
+use super::record::{Record, half_area};
+use crate::{bounds::BoundsA, simd::Simd, triangle::LANES};
 
 /// Most bins along an axis.
 pub const MOST: usize = 16;
@@ -18,34 +18,8 @@ pub struct Mapping {
     scale: Vec3A,
 }
 
-impl Mapping {
-    /// Of records to `bins` bins.
-    pub fn new(records: &[Record], bins: usize) -> Self {
-        Self::between(&Centres::of(records), bins)
-    }
-
-    /// Of centres in a box.
-    #[inline(always)]
-    pub fn between(centres: &Centres, bins: usize) -> Self {
-        let scale = bins as f32 * (1.0 - 1e-6) / (centres.upper - centres.lower);
-        Self { lower: centres.lower, scale: Vec3A::select(scale.cmple(Vec3A::splat(f32::MAX)), scale, Vec3A::ZERO) }
-    }
-
-    /// The bins of a centre, in the low bits: a number below 2^22 plus this constant has its integer there, and needs no
-    /// instruction to convert it.
-    #[inline(always)]
-    fn bins(&self, centre: Vec3A) -> [usize; 3] {
-        const INTEGER: f32 = (3 << 22) as f32;
-        let shifted = (centre - self.lower) * self.scale - Vec3A::splat(0.5) + Vec3A::splat(INTEGER);
-        shifted.to_array().map(|number| number.to_bits() as usize & (MOST - 1))
-    }
-
-    /// Whether a record lies before a plane.
-    #[inline(always)]
-    pub fn is_left(&self, record: &Record, plane: &Plane) -> bool {
-        self.bins(record.centre())[plane.axis] < plane.bin
-    }
-}
+/// A number below 2^22 plus this constant has its integer in the low bits, and needs no instruction to convert it.
+const INTEGER: f32 = (3 << 22) as f32;
 
 /// The box around twice the centres of records.
 pub type Centres = BoundsA;
@@ -54,10 +28,40 @@ impl Centres {
     /// Of some records.
     #[inline(always)]
     pub fn of(records: &[Record]) -> Self {
-        records.iter().fold(Self::EMPTY, |all, record| {
+        let mut all = Self::EMPTY;
+        for record in records {
             let centre = record.centre();
-            all.union(&Self { lower: centre, upper: centre })
-        })
+            all = all.union(&Self { lower: centre, upper: centre });
+        }
+        all
+    }
+}
+
+impl Mapping {
+    /// Of centres in a box to `bins` bins.
+    #[inline(always)]
+    pub fn between(centres: &Centres, bins: usize) -> Self {
+        let scale = bins as f32 * (1.0 - 1e-6) / (centres.upper - centres.lower);
+        Self { lower: centres.lower, scale: Vec3A::select(scale.cmple(Vec3A::splat(f32::MAX)), scale, Vec3A::ZERO) }
+    }
+
+    #[inline(always)]
+    fn bins(&self, record: &Record) -> [usize; 3] {
+        let place = (record.centre() - self.lower) * self.scale - Vec3A::splat(0.5) + Vec3A::splat(INTEGER);
+        place.to_array().map(|place| place.to_bits() as usize & (MOST - 1))
+    }
+
+    /// Whether a record lies before a plane: along its axis, the arithmetic of [`Mapping::bins`].
+    #[inline(always)]
+    pub fn is_left(lower: f32, scale: f32, record: &Record, plane: &Plane) -> bool {
+        let place = (record.centre_along(plane.axis) - lower) * scale - 0.5 + INTEGER;
+        (place.to_bits() as usize & (MOST - 1)) < plane.bin
+    }
+
+    /// Where bins begin along an axis, and how many there are to a unit.
+    #[inline(always)]
+    pub fn along(&self, axis: usize) -> (f32, f32) {
+        (self.lower[axis], self.scale[axis])
     }
 }
 
@@ -71,109 +75,127 @@ pub struct Plane {
     cost: f32,
 }
 
-/// A part of the records: the box around them, and how many triangles they are.
+/// A part of the records: the box around them, as in [`Record::row`], and how many triangles they are.
 #[derive(Debug, Clone, Copy)]
 pub struct Side {
-    /// The box around them.
-    pub bounds: BoundsA,
+    row: [f32; LANES],
     /// Their triangles.
     pub count: u32,
 }
 
 impl Side {
-    const EMPTY: Self = Self { bounds: BoundsA::EMPTY, count: 0 };
+    const EMPTY: Self = Self { row: Record::NONE.row, count: 0 };
 
-    /// Take in more.
     #[inline(always)]
-    fn add(&mut self, bounds: &BoundsA, count: u32) {
-        self.bounds = self.bounds.union(bounds);
+    fn add(&mut self, row: &[f32; LANES], count: u32) {
+        for lane in 0..LANES {
+            self.row[lane] = self.row[lane].min(row[lane]);
+        }
         self.count += count;
     }
 
-    /// Expected work, up to a constant; not a number where there are no triangles.
+    /// Half the surface area of the box.
     #[inline(always)]
-    fn cost(&self) -> f32 {
-        self.bounds.half_area() * self.count.div_ceil(LANES as u32) as f32
+    pub fn half_area(&self) -> f32 {
+        half_area(&self.row)
     }
 
-    /// Both together.
+    /// All of some records.
     pub fn of(records: &[Record]) -> Self {
-        records.iter().fold(Self::EMPTY, |mut side, record| {
-            side.add(&record.bounds(), record.count());
-            side
-        })
+        let mut side = Self::EMPTY;
+        records.iter().for_each(|record| side.add(&record.row, record.count()));
+        side
     }
+}
+
+/// Expected work, up to a constant; not a number where there are no triangles.
+#[inline(always)]
+fn cost(row: &[f32; LANES], count: u32) -> f32 {
+    half_area(row) * count.div_ceil(LANES as u32) as f32
 }
 
 /// Bins of records along all axes, reused from node to node.
 #[derive(Debug, Clone)]
+#[repr(C, align(32))]
 pub struct Bins {
-    bins: [[Side; MOST]; 3],
+    rows: [[[f32; LANES]; 3]; MOST],
+    counts: [[u32; 3]; MOST],
     used: usize,
 }
 
 impl Bins {
     /// Nothing in them.
-    pub const EMPTY: Self = Self { bins: [[Side::EMPTY; MOST]; 3], used: MOST };
+    pub const EMPTY: Self = Self { rows: [[Record::NONE.row; 3]; MOST], counts: [[0; 3]; MOST], used: MOST };
 
     /// Put records into `used` bins along every axis.
     #[inline(always)]
-    pub fn fill(&mut self, records: &[Record], mapping: &Mapping, used: usize) {
+    pub fn fill<S: Simd>(&mut self, simd: S, records: &[Record], mapping: &Mapping, used: usize) {
         self.used = used;
-        self.bins.iter_mut().for_each(|axis| axis[..used].fill(Side::EMPTY));
+        self.rows[..used].fill([Record::NONE.row; 3]);
+        self.counts[..used].fill([0; 3]);
         for record in records {
-            let (places, bounds, count) = (mapping.bins(record.centre()), record.bounds(), record.count());
+            let (places, row, count) = (mapping.bins(record), simd.load(&record.row), record.count());
             for axis in 0..3 {
-                self.bins[axis][places[axis]].add(&bounds, count);
+                let bin = &mut self.rows[places[axis]][axis];
+                *bin = simd.store(simd.min(simd.load(bin), row));
+                self.counts[places[axis]][axis] += count;
             }
         }
     }
 
     /// Together with what is in as many other bins.
     pub fn with(mut self, other: Self) -> Self {
-        for (mine, theirs) in self.bins.iter_mut().flatten().zip(other.bins.iter().flatten()) {
-            mine.add(&theirs.bounds, theirs.count);
+        for (mine, theirs) in self.rows.iter_mut().flatten().zip(other.rows.iter().flatten()) {
+            *mine = std::array::from_fn(|lane| mine[lane].min(theirs[lane]));
+        }
+        for (mine, theirs) in self.counts.iter_mut().flatten().zip(other.counts.iter().flatten()) {
+            *mine += theirs;
         }
         self
     }
 
-    /// The cheapest plane with records on both of its sides.
+    /// The cheapest plane with records on both of its sides: a side without triangles has infinite extents and no
+    /// blocks, so that its cost is not a number, and less than none.
     #[inline(always)]
-    pub fn cheapest(&self) -> Option<Plane> {
+    pub fn cheapest<S: Simd>(&self, simd: S) -> Option<Plane> {
+        let right_costs = self.right_costs(simd);
         let mut best = Plane { axis: 0, bin: 0, cost: f32::INFINITY };
-        for axis in 0..3 {
-            self.sweep(axis, &mut best);
+        let (mut left, mut counts) = ([simd.splat(f32::INFINITY); 3], [0; 3]);
+        for bin in 1..self.used {
+            for axis in 0..3 {
+                left[axis] = simd.min(left[axis], simd.load(&self.rows[bin - 1][axis]));
+                counts[axis] += self.counts[bin - 1][axis];
+                let cost = cost(&simd.store(left[axis]), counts[axis]) + right_costs[bin][axis];
+                if cost < best.cost {
+                    best = Plane { axis, bin, cost };
+                }
+            }
         }
         (best.bin > 0).then_some(best)
     }
 
-    /// A side without triangles has infinite extents and no blocks, so that its cost is not a number, and less than none.
+    /// The cost of what lies from each bin on.
     #[inline(always)]
-    fn sweep(&self, axis: usize, best: &mut Plane) {
-        let bins = &self.bins[axis][..self.used];
-        let (mut right_costs, mut right) = ([0.0; MOST], Side::EMPTY);
-        for bin in (1..bins.len()).rev() {
-            right.add(&bins[bin].bounds, bins[bin].count);
-            right_costs[bin] = right.cost();
-        }
-        let mut left = Side::EMPTY;
-        for bin in 1..bins.len() {
-            left.add(&bins[bin - 1].bounds, bins[bin - 1].count);
-            let cost = left.cost() + right_costs[bin];
-            if cost < best.cost {
-                *best = Plane { axis, bin, cost };
+    fn right_costs<S: Simd>(&self, simd: S) -> [[f32; 3]; MOST] {
+        let mut costs = [[0.0; 3]; MOST];
+        let (mut right, mut counts) = ([simd.splat(f32::INFINITY); 3], [0; 3]);
+        for bin in (1..self.used).rev() {
+            for axis in 0..3 {
+                right[axis] = simd.min(right[axis], simd.load(&self.rows[bin][axis]));
+                counts[axis] += self.counts[bin][axis];
+                costs[bin][axis] = cost(&simd.store(right[axis]), counts[axis]);
             }
         }
+        costs
     }
 
     /// What lies on either side of a plane.
     #[inline(always)]
     pub fn sides(&self, plane: &Plane) -> [Side; 2] {
-        let bins = &self.bins[plane.axis][..self.used];
-        [&bins[..plane.bin], &bins[plane.bin..]].map(|part| {
-            let mut side = Side::EMPTY;
-            part.iter().for_each(|bin| side.add(&bin.bounds, bin.count));
-            side
-        })
+        let mut sides = [Side::EMPTY; 2];
+        for bin in 0..self.used {
+            sides[usize::from(bin >= plane.bin)].add(&self.rows[bin][plane.axis], self.counts[bin][plane.axis]);
+        }
+        sides
     }
 }

@@ -11,10 +11,10 @@ use super::{
     planner::{Planner, Set, open},
     record::Record,
 };
-use crate::{Error, Job, error};
+use crate::{Error, Job, error, simd::Level};
 
 /// Parts at the top of at most this many triangles are not divided further: their cells are too few to tell where.
-const WHOLE: usize = SUBTREE / 16;
+const WHOLE: usize = SUBTREE / 4;
 
 /// Plan the tree over clusters.
 ///
@@ -25,14 +25,14 @@ pub fn plan(clusters: &Clusters, leaf_size: usize, job: &Job) -> Result<(Top, Ve
     let mut spare = error::filled(cells.len(), Record::NONE, "the cells")?;
     let (mut top, mut subtrees) = (Top::default(), Vec::new());
     if !cells.is_empty() {
-        let upper = upper(Set::new(&mut cells, &mut spare), job)?;
+        let upper = upper(Set::new(&mut cells, &mut spare), Level::detect(), job)?;
         upper.number(&mut top, &mut subtrees);
     }
     let drafts = subtrees.into_par_iter().map_init(Planner::default, |planner, cells| {
         job.check()?;
         let mut draft = Draft::default();
-        let records = cells.iter().flat_map(|cell| clusters.of_cell(cell));
-        planner.plan(records, &clusters.triangles, leaf_size, &mut draft);
+        let expand = |records: &mut Vec<Record>| cells.iter().for_each(|cell| clusters.expand(cell, records));
+        planner.plan(expand, &clusters.triangles, leaf_size, &mut draft);
         job.advance(draft.triangles as u64);
         Ok(draft)
     });
@@ -45,14 +45,14 @@ enum Upper<'r> {
     Subtree(&'r [Record]),
 }
 
-fn upper<'r>(set: Set<'r>, job: &Job) -> Result<Upper<'r>, Error> {
+fn upper<'r>(set: Set<'r>, level: Level, job: &Job) -> Result<Upper<'r>, Error> {
     if set.count() <= SUBTREE {
         return Ok(Upper::Subtree(set.into_records()));
     }
     job.check()?;
-    let parts = open(set, WHOLE, &mut Bins::EMPTY.clone());
+    let parts = open(set, WHOLE, &mut Bins::EMPTY.clone(), level);
     let parts: Vec<Set<'r>> = parts.into_iter().flatten().collect();
-    Ok(Upper::Node(parts.into_par_iter().map(|part| upper(part, job)).collect::<Result<_, Error>>()?))
+    Ok(Upper::Node(parts.into_par_iter().map(|part| upper(part, level, job)).collect::<Result<_, Error>>()?))
 }
 
 impl<'r> Upper<'r> {

@@ -26,6 +26,7 @@ use crate::{
     arena::Arena,
     bounds::{Bounds, BoundsA},
     error,
+    simd::Level,
     traverse::frame::Domain,
     triangle::LANES,
 };
@@ -65,10 +66,11 @@ pub fn build(mesh: &Mesh, job: &Job) -> Result<Structure, Error> {
     let bounds = blocks.large.par_iter().map(|large| Run::new(&blocks.items, large.clone()).total.bounds);
     let bounds: Vec<BoundsA> = bounds.collect();
     // Every large block counts as one leaf.
-    let record = |(index, bounds)| Record::new(&cube.mapped(bounds), index as u32, LANES as u32);
+    let record = |(index, bounds)| Record::new(&cube.mapped(bounds), index, LANES as u32);
     records.extend(bounds.iter().enumerate().map(record));
     let mut spare = error::filled(records.len(), Record::NONE, WHAT)?;
-    let work = Work { keys: &keys, blocks: &blocks, centre: domain.centre.into(), scale: cube.scale(), job };
+    let (centre, level) = (domain.centre.into(), Level::detect());
+    let work = Work { keys: &keys, blocks: &blocks, centre, scale: cube.scale(), level, job };
     let (mut part, mut bins) = (Part::default(), Bins::EMPTY);
     let placed = work.above(Set::new(&mut records, &mut spare), &mut bins, &mut part)?;
     let mut nodes = Arena::zeroed(part.nodes.len(), "the nodes")?;
@@ -169,6 +171,7 @@ struct Work<'a> {
     blocks: &'a Blocks,
     centre: Vec3A,
     scale: f32,
+    level: Level,
     job: &'a Job,
 }
 
@@ -206,7 +209,7 @@ impl Work<'_> {
         }
         let slot = part.reserve_node();
         let is_large = set.records().len() > SEQUENTIAL;
-        let sets = planner::open(set, LANES, bins);
+        let sets = planner::open(set, LANES, bins, self.level);
         let children = if is_large { self.in_parallel(sets, part)? } else { self.in_turn(sets, bins, part)? };
         Ok(part.place(slot, &children, self.centre))
     }

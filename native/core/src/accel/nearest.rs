@@ -1,11 +1,10 @@
 //! Who is whose nearest among neighbours in a list of boxes.
 
+use super::record::Record;
 use crate::{
-    bounds::BoundsA,
     simd::{Kernel, Level, Simd},
     triangle::LANES,
 };
-use glam::Vec3A;
 
 /// Most boxes at once.
 pub const MOST: usize = 1024;
@@ -17,23 +16,25 @@ const REACH: usize = 15;
 const ROOM: usize = 16 + MOST + 32;
 const FRONT: usize = 16;
 
-/// A box that is near to none.
-const FAR: f32 = 1e12;
+/// The sides of a box that is near to none.
+const FAR: f32 = -1e12;
 
 type Column = [f32; ROOM];
 
-/// Boxes by column, and the distances between them.
+/// Boxes, and the distances between them.
 ///
 /// The distance of two boxes is the area of the box around both. Its last bits are replaced by those of the exclusive or
 /// of both places, which is the same seen from either side: so the least distance of all is always mutual, also among
 /// many equal ones, and the other's place is found from one's own.
 #[derive(Debug)]
 pub struct Neighbours {
-    count: usize,
+    records: Vec<Record>,
+    /// By column, as in [`Record::row`].
     planes: Box<[Column; 6]>,
     /// `distances[k][i]` is that from box `i` to box `i + k + 1`.
     distances: Box<[Column; REACH]>,
-    nearest: Box<Column>,
+    least: Box<Column>,
+    nearest: Vec<u16>,
 }
 
 /// The bits of a distance that tell a place.
@@ -57,63 +58,50 @@ const fn sides() -> [[[f32; LANES]; REACH]; 4] {
 impl Default for Neighbours {
     fn default() -> Self {
         Self {
-            count: 0,
-            planes: Box::new([[0.0; ROOM]; 6]),
+            records: Vec::new(),
+            planes: Box::new([[FAR; ROOM]; 6]),
             distances: Box::new([[f32::MAX; ROOM]; REACH]),
-            nearest: Box::new([0.0; ROOM]),
+            least: Box::new([0.0; ROOM]),
+            nearest: Vec::new(),
         }
     }
 }
 
 impl Neighbours {
-    /// Forget all boxes.
-    pub fn clear(&mut self) {
-        self.count = 0;
-    }
-
-    /// Add a box behind the last; there may be [`MOST`].
-    #[inline(always)]
-    pub fn push(&mut self, bounds: &BoundsA) {
-        self.set(self.count, bounds);
-        self.count += 1;
-    }
-
-    #[inline(always)]
-    fn set(&mut self, index: usize, bounds: &BoundsA) {
-        for k in 0..3 {
-            self.planes[k][FRONT + index] = bounds.lower[k];
-            self.planes[3 + k][FRONT + index] = bounds.upper[k];
-        }
-    }
-
-    /// A box.
-    #[inline(always)]
-    pub fn bounds(&self, index: usize) -> BoundsA {
-        let corner = |first: usize| Vec3A::from_array(std::array::from_fn(|k| self.planes[first + k][FRONT + index]));
-        BoundsA { lower: corner(0), upper: corner(3) }
-    }
-
-    /// Find the nearest neighbour of every box.
-    pub fn find(&mut self, level: Level) {
-        let nowhere = BoundsA { lower: Vec3A::splat(-FAR), upper: Vec3A::splat(FAR) };
-        (self.count..self.count + 24).for_each(|index| self.set(index, &nowhere));
+    /// Find the nearest neighbour of each of at most [`MOST`] boxes.
+    pub fn find(&mut self, records: &[Record], level: Level) {
+        self.records.clear();
+        self.records.extend_from_slice(records);
+        let count = self.records.len();
+        // Columns are filled by eight, and read to [`REACH`] beyond the last.
+        self.records.resize(count.next_multiple_of(LANES) + 2 * LANES, Record { row: [FAR; LANES] });
         level.run(Find(self));
+        self.records.truncate(count);
+        let least = &self.least[FRONT..FRONT + count];
+        self.nearest.clear();
+        self.nearest.extend(least.iter().enumerate().map(|(index, least)| other(index, *least)));
+    }
+
+    /// The boxes.
+    pub fn records(&self) -> &[Record] {
+        &self.records
     }
 
     /// The nearest neighbour of a box whose nearest it is, too.
     #[inline(always)]
     pub fn mutual(&self, index: usize) -> Option<usize> {
-        let nearest = self.nearest(index);
-        (nearest < self.count && self.nearest(nearest) == index).then_some(nearest)
+        let nearest = usize::from(self.nearest[index]);
+        (self.nearest.get(nearest).copied() == Some(index as u16)).then_some(nearest)
     }
+}
 
-    #[inline(always)]
-    fn nearest(&self, index: usize) -> usize {
-        let place = (self.nearest[FRONT + index].to_bits() ^ index as u32) & PLACE;
-        let ahead = place.wrapping_sub(index as u32) & PLACE;
-        let distance = if ahead > REACH as u32 { ahead.wrapping_sub(PLACE + 1) } else { ahead };
-        index.wrapping_add_signed(distance as i32 as isize)
-    }
+/// Whose distance that is.
+#[inline(always)]
+fn other(index: usize, distance: f32) -> u16 {
+    let place = (distance.to_bits() ^ index as u32) & PLACE;
+    let ahead = place.wrapping_sub(index as u32) & PLACE;
+    let behind = if ahead > REACH as u32 { PLACE + 1 } else { 0 };
+    (index as u32).wrapping_add(ahead).wrapping_sub(behind) as u16
 }
 
 /// Eight entries of a column.
@@ -129,20 +117,41 @@ impl Kernel for Find<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        let Neighbours { count, planes, distances, nearest } = self.0;
-        let end = FRONT + *count;
+        let Neighbours { records, planes, distances, least, .. } = self.0;
+        for (index, eight) in records.as_chunks::<LANES>().0.iter().enumerate() {
+            columns(simd, eight, planes, FRONT + index * LANES);
+        }
+        let end = FRONT + records.len() - 2 * LANES;
         for first in (FRONT..end).step_by(LANES) {
-            ahead(simd, planes, distances, nearest, first);
+            ahead(simd, planes, distances, least, first);
         }
         for first in (FRONT..end).step_by(LANES) {
-            behind(simd, distances, nearest, first);
+            behind(simd, distances, least, first);
         }
+    }
+}
+
+/// Bring eight rows into columns.
+#[inline(always)]
+fn columns<S: Simd>(simd: S, rows: &[Record; LANES], planes: &mut [Column; 6], first: usize) {
+    let columns = simd.transpose([
+        simd.load(&rows[0].row),
+        simd.load(&rows[1].row),
+        simd.load(&rows[2].row),
+        simd.load(&rows[3].row),
+        simd.load(&rows[4].row),
+        simd.load(&rows[5].row),
+        simd.load(&rows[6].row),
+        simd.load(&rows[7].row),
+    ]);
+    for plane in 0..6 {
+        planes[plane][first..first + LANES].copy_from_slice(&simd.store(columns[plane + plane / 3]));
     }
 }
 
 /// Distances from eight boxes to those that follow each, and the least of them.
 #[inline(always)]
-fn ahead<S: Simd>(simd: S, planes: &[Column; 6], distances: &mut [Column; REACH], nearest: &mut Column, first: usize) {
+fn ahead<S: Simd>(simd: S, planes: &[Column; 6], distances: &mut [Column; REACH], least: &mut Column, first: usize) {
     let own: [S::F32; 6] = std::array::from_fn(|plane| simd.load(at(&planes[plane], first)));
     let high = simd.splat(f32::from_bits(!PLACE));
     let sides = &SIDES[(first - FRONT) / LANES % 4];
@@ -152,8 +161,8 @@ fn ahead<S: Simd>(simd: S, planes: &[Column; 6], distances: &mut [Column; REACH]
         let mut edges = own;
         for axis in 0..3 {
             let lower = simd.min(own[axis], simd.load(at(&planes[axis], other)));
-            let upper = simd.max(own[3 + axis], simd.load(at(&planes[3 + axis], other)));
-            edges[axis] = simd.sub(upper, lower);
+            let upper = simd.min(own[3 + axis], simd.load(at(&planes[3 + axis], other)));
+            edges[axis] = simd.add(lower, upper);
         }
         let [x, y, z, ..] = edges;
         let area = simd.add(simd.mul(x, simd.add(y, z)), simd.mul(y, z));
@@ -161,44 +170,51 @@ fn ahead<S: Simd>(simd: S, planes: &[Column; 6], distances: &mut [Column; REACH]
         best = simd.min(distance, best);
         distances[k][first..first + LANES].copy_from_slice(&simd.store(distance));
     }
-    nearest[first..first + LANES].copy_from_slice(&simd.store(best));
+    least[first..first + LANES].copy_from_slice(&simd.store(best));
 }
 
 /// Let the boxes before eight boxes be their nearest, too.
 #[inline(always)]
-fn behind<S: Simd>(simd: S, distances: &[Column; REACH], nearest: &mut Column, first: usize) {
-    let mut best = simd.load(at(nearest, first));
+fn behind<S: Simd>(simd: S, distances: &[Column; REACH], least: &mut Column, first: usize) {
+    let mut best = simd.load(at(least, first));
     for k in 0..REACH {
         best = simd.min(simd.load(at(&distances[k], first - k - 1)), best);
     }
-    nearest[first..first + LANES].copy_from_slice(&simd.store(best));
+    least[first..first + LANES].copy_from_slice(&simd.store(best));
 }
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use glam::Vec3A;
 
-    fn distance(neighbours: &Neighbours, a: usize, b: usize) -> u32 {
-        let area = neighbours.bounds(a).union(&neighbours.bounds(b)).half_area();
+    use super::*;
+    use crate::bounds::BoundsA;
+
+    fn distance(records: &[Record], a: usize, b: usize) -> u32 {
+        let area = records[a].union(&records[b], 0).half_area();
         area.to_bits() & !PLACE | (a ^ b) as u32 & PLACE
     }
 
     #[test]
     fn nearest_are_those_of_all_within_reach() {
+        let record = |index: usize, step: usize| {
+            let lower = Vec3A::new((index * step % 64) as f32, (index * step % 16) as f32, 1.0);
+            Record::new(&BoundsA { lower, upper: lower + Vec3A::new(2.0, 1.0, 4.0) }, index, 1)
+        };
         for level in Level::available() {
-            for (count, step) in [(1, 3), (2, 1), (300, 7), (MOST, 37), (77, 0)] {
-                let mut neighbours = Neighbours::default();
-                for index in 0..count {
-                    let lower = Vec3A::new((index * step % 64) as f32, (index * step % 16) as f32, 1.0);
-                    neighbours.push(&BoundsA { lower, upper: lower + Vec3A::new(2.0, 1.0, 4.0) });
-                }
-                neighbours.find(level);
+            let mut neighbours = Neighbours::default();
+            for (count, step) in [(300, 7), (MOST, 37), (2, 1), (1, 3), (77, 0)] {
+                let records: Vec<Record> = (0..count).map(|index| record(index, step)).collect();
+                neighbours.find(&records, level);
+                let records = neighbours.records();
+                assert_eq!(records.len(), count);
                 for index in 0..count {
                     let reach = index.saturating_sub(REACH)..count.min(index + REACH + 1);
                     let others = reach.filter(|&other| other != index);
-                    let nearest = others.min_by_key(|&other| distance(&neighbours, index, other));
+                    let nearest = others.min_by_key(|&other| distance(records, index, other));
                     if let Some(nearest) = nearest {
-                        assert_eq!(neighbours.nearest(index), nearest, "{index} of {count}, {}", level.name());
+                        let found = usize::from(neighbours.nearest[index]);
+                        assert_eq!(found, nearest, "{index} of {count}, {}", level.name());
                     }
                 }
             }

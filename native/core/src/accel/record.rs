@@ -2,52 +2,106 @@
 
 use glam::{Vec3, Vec3A, Vec4};
 
-use crate::bounds::{Bounds, BoundsA};
+use crate::{
+    bounds::{Bounds, BoundsA},
+    triangle::LANES,
+};
 
 /// Some triangles that stay together, in 32 bytes: the box around them, where they are listed, and how many they are.
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(32))]
 pub struct Record {
-    /// Fourth lane: the bits of the first place in the list.
-    lower: Vec4,
-    /// Fourth lane: the bits of the number of triangles.
-    upper: Vec4,
+    /// Least corner, then the first place in the list; greatest corner, negated, then the number of triangles. So the box
+    /// around two is the lesser of each pair of numbers.
+    pub row: [f32; LANES],
+}
+
+/// A whole number below 2^27 as the bits of a normal float: it goes through arithmetic beside the corners, which denormal
+/// numbers make twice as slow.
+const NUMBER: u32 = 0x4000_0000;
+
+fn number(value: u32) -> f32 {
+    f32::from_bits(NUMBER | value)
 }
 
 impl Record {
-    /// Fills buffers.
-    pub const NONE: Self = Self { lower: Vec4::ZERO, upper: Vec4::ZERO };
+    /// Contains nothing and is neutral under [`Record::union`].
+    pub const NONE: Self = Self { row: [f32::INFINITY; LANES] };
 
     /// Of `count` triangles that are listed from `first` on.
     #[inline(always)]
-    pub fn new(bounds: &BoundsA, first: u32, count: u32) -> Self {
-        Self { lower: bounds.lower.extend(f32::from_bits(first)), upper: bounds.upper.extend(f32::from_bits(count)) }
+    pub fn new(bounds: &BoundsA, first: usize, count: u32) -> Self {
+        let (lower, upper) = (bounds.lower.to_array(), (-bounds.upper).to_array());
+        let [first, count] = [number(first as u32), number(count)];
+        Self { row: [lower[0], lower[1], lower[2], first, upper[0], upper[1], upper[2], count] }
+    }
+
+    /// The same, listed from `first` on.
+    #[inline(always)]
+    pub fn at(mut self, first: usize) -> Self {
+        self.row[3] = number(first as u32);
+        self
+    }
+
+    /// The box around the triangles of both, which are listed from `first` on.
+    #[inline(always)]
+    pub fn union(&self, other: &Self, first: usize) -> Self {
+        let mut row = std::array::from_fn(|lane| self.row[lane].min(other.row[lane]));
+        (row[3], row[7]) = (number(first as u32), number(self.count() + other.count()));
+        Self { row }
     }
 
     /// The box around them.
     #[inline(always)]
     pub fn bounds(&self) -> BoundsA {
-        BoundsA { lower: Vec3A::from_vec4(self.lower), upper: Vec3A::from_vec4(self.upper) }
+        let [lower, upper] = self.corners();
+        BoundsA { lower: Vec3A::from_vec4(lower), upper: -Vec3A::from_vec4(upper) }
+    }
+
+    #[inline(always)]
+    fn corners(&self) -> [Vec4; 2] {
+        let [a, b, c, d, e, f, g, h] = self.row;
+        [Vec4::new(a, b, c, d), Vec4::new(e, f, g, h)]
     }
 
     /// Twice the middle of the box.
     #[inline(always)]
     pub fn centre(&self) -> Vec3A {
-        Vec3A::from_vec4(self.lower + self.upper)
+        let [lower, upper] = self.corners();
+        Vec3A::from_vec4(lower - upper)
+    }
+
+    /// The same along one axis.
+    #[inline(always)]
+    pub fn centre_along(&self, axis: usize) -> f32 {
+        self.row[axis & 3] - self.row[4 + (axis & 3)]
+    }
+
+    /// Half the surface area of the box.
+    #[inline(always)]
+    pub fn half_area(&self) -> f32 {
+        half_area(&self.row)
     }
 
     /// Where its triangles are listed.
     #[inline(always)]
     pub fn range(&self) -> std::ops::Range<usize> {
-        let first = self.lower.w.to_bits() as usize;
+        let first = (self.row[3].to_bits() ^ NUMBER) as usize;
         first..first + self.count() as usize
     }
 
     /// How many triangles it has.
     #[inline(always)]
     pub fn count(&self) -> u32 {
-        self.upper.w.to_bits()
+        self.row[7].to_bits() ^ NUMBER
     }
+}
+
+/// Half the surface area of the box in a [`Record::row`].
+#[inline(always)]
+pub fn half_area(row: &[f32; LANES]) -> f32 {
+    let [x, y, z] = [row[0] + row[4], row[1] + row[5], row[2] + row[6]];
+    x * (y + z) + y * z
 }
 
 /// Maps the box of a scene into the unit cube, by one scale for all axes, so that areas of boxes neither overflow nor

@@ -53,8 +53,8 @@ impl SmallBuilder {
         draft.clear();
         if !triangles.is_empty() {
             let record =
-                |(index, &triangle): (usize, &u32)| Record::new(&cube.bounds(mesh.corners(triangle)), index as u32, 1);
-            planner.plan(triangles.iter().enumerate().map(record), triangles, LANES, draft);
+                |(index, &triangle): (usize, &u32)| Record::new(&cube.bounds(mesh.corners(triangle)), index, 1);
+            planner.plan(|records| records.extend(triangles.iter().enumerate().map(record)), triangles, LANES, draft);
         }
         self.write(mesh)
     }
