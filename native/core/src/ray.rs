@@ -5,6 +5,7 @@ use glam::Vec3;
 use crate::{
     Error,
     traverse::frame::{Domain, Frame},
+    triangle::LANES,
 };
 
 /// The primitive of a ray that hit nothing.
@@ -148,6 +149,13 @@ impl<'a> Rays<'a> {
         ]
     }
 
+    /// Whether rays `index` and `index + 7` are there and start at one point.
+    #[inline(always)]
+    pub(crate) fn is_common_origin(&self, index: usize) -> bool {
+        let (first, last) = (self.first + index, self.first + index + LANES - 1);
+        index + LANES <= self.count && self.origin.iter().all(|axis| axis.get(first) == axis.get(last))
+    }
+
     /// Gather ray `index`.
     #[inline(always)]
     pub fn get(&self, index: usize) -> Ray {
@@ -226,6 +234,15 @@ impl<'a> HitsMut<'a> {
         columns.map(|((t, primitive), (u, v))| HitsMut { t, primitive, u, v })
     }
 
+    /// Write the hits of rays `index` to `index + 7`.
+    #[inline(always)]
+    pub(crate) fn set_eight(&mut self, index: usize, hits: &Eight) {
+        self.t[index..index + LANES].copy_from_slice(&hits.t);
+        self.primitive[index..index + LANES].copy_from_slice(&hits.primitive);
+        self.u[index..index + LANES].copy_from_slice(&hits.u);
+        self.v[index..index + LANES].copy_from_slice(&hits.v);
+    }
+
     /// Write one hit.
     #[inline(always)]
     pub fn set(&mut self, index: usize, hit: Hit) {
@@ -233,6 +250,34 @@ impl<'a> HitsMut<'a> {
         self.primitive[index] = hit.primitive;
         self.u[index] = hit.u;
         self.v[index] = hit.v;
+    }
+}
+
+/// Eight hits by column.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Eight {
+    /// See [`Hits::t`].
+    pub t: [f32; LANES],
+    /// See [`Hits::primitive`].
+    pub primitive: [u32; LANES],
+    /// See [`Hits::u`].
+    pub u: [f32; LANES],
+    /// See [`Hits::v`].
+    pub v: [f32; LANES],
+}
+
+impl Eight {
+    /// Nothing was hit.
+    pub const MISSES: Self =
+        Self { t: [f32::INFINITY; LANES], primitive: [MISS; LANES], u: [0.0; LANES], v: [0.0; LANES] };
+
+    /// Write one hit.
+    #[inline(always)]
+    pub fn set(&mut self, lane: usize, hit: Hit) {
+        self.t[lane] = hit.t;
+        self.primitive[lane] = hit.primitive;
+        self.u[lane] = hit.u;
+        self.v[lane] = hit.v;
     }
 }
 

@@ -60,6 +60,8 @@ pub trait Simd: Copy + Send + Sync + 'static {
     fn mul(self, a: Self::F32, b: Self::F32) -> Self::F32;
     /// a * b + c, rounded once or twice
     fn mul_add(self, a: Self::F32, b: Self::F32, c: Self::F32) -> Self::F32;
+    /// a * b - c, rounded once or twice
+    fn mul_sub(self, a: Self::F32, b: Self::F32, c: Self::F32) -> Self::F32;
     /// The lesser of each pair.
     fn min(self, a: Self::F32, b: Self::F32) -> Self::F32;
     /// The greater of each pair.

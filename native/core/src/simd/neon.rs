@@ -148,6 +148,10 @@ impl Simd for Neon {
         halves!(a, b, c => vfmaq_f32(c, a, b))
     }
     #[inline(always)]
+    fn mul_sub(self, a: Pair, b: Pair, c: Pair) -> Pair {
+        halves!(a, b, c => vnegq_f32(vfmsq_f32(c, a, b)))
+    }
+    #[inline(always)]
     fn min(self, a: Pair, b: Pair) -> Pair {
         // Not `vminq_f32`: that returns not-a-number where either argument is.
         halves!(a, b => vbslq_f32(vcltq_f32(a, b), a, b))

@@ -146,6 +146,11 @@ macro_rules! arithmetic {
             unsafe { _mm256_fmadd_ps(a, b, c) }
         }
         #[inline(always)]
+        fn mul_sub(self, a: __m256, b: __m256, c: __m256) -> __m256 {
+            // SAFETY: a token exists only where FMA was detected.
+            unsafe { _mm256_fmsub_ps(a, b, c) }
+        }
+        #[inline(always)]
         fn min(self, a: __m256, b: __m256) -> __m256 {
             // SAFETY: as for `splat`.
             unsafe { _mm256_min_ps(a, b) }

@@ -3,23 +3,21 @@
 use std::{cell::RefCell, marker::PhantomData};
 
 use super::{
-    answers::Answers,
     frame::Frame,
     kernel::{self, Entry},
+    pace::Pace,
     probe::{Counts, Probe, Silent},
-    setup,
-    stream::{self, Bin, Lists},
+    stream::{Bin, Lists},
+    tile::{Tile, Visit},
+    together::{Take, Together, in_ray_units},
 };
-use bytemuck::Zeroable;
-
 use crate::{
     Error, Job, Mesh,
     accel::structure::Structure,
     job::Phase,
     pool,
-    ray::{Hit, HitsMut, MISS, Ray, Rays},
+    ray::{Hit, HitsMut, Ray, Rays},
     simd::{Kernel, Level, Simd},
-    triangle::LANES,
 };
 
 /// A structure, the mesh it stands for, and the instruction set to use.
@@ -40,8 +38,7 @@ impl<'a> Tracer<'a> {
     /// [`Error::Ray`] for the first unusable ray.
     pub fn closest(self, rays: &Rays<'_>, hits: &mut HitsMut<'_>) -> Result<(), Error> {
         assert_eq!(rays.len(), hits.len());
-        let take = |index, frame: &Frame, hit: Hit| hits.set(index, in_ray_units(frame, hit));
-        self.silent::<false>(rays, take)
+        self.silent::<_, false>(rays, hits, &Pace::default())
     }
 
     /// Whether anything lies in the interval of every ray, on the calling thread.
@@ -50,8 +47,7 @@ impl<'a> Tracer<'a> {
     /// [`Error::Ray`] for the first unusable ray.
     pub fn occluded(self, rays: &Rays<'_>, occluded: &mut [bool]) -> Result<(), Error> {
         assert_eq!(rays.len(), occluded.len());
-        let take = |index: usize, _: &Frame, hit: Hit| occluded[index] = hit.primitive != MISS;
-        self.silent::<true>(rays, take)
+        self.silent::<_, true>(rays, occluded, &Pace::default())
     }
 
     /// What the closest-hit query of every ray costs where it walks alone, on the calling thread.
@@ -82,14 +78,14 @@ impl<'a> Tracer<'a> {
         Ok(in_ray_units(&frame, hit))
     }
 
-    fn silent<const ANY: bool>(self, rays: &Rays<'_>, mut take: impl FnMut(usize, &Frame, Hit)) -> Result<(), Error> {
+    fn silent<T: Take + ?Sized, const ANY: bool>(self, rays: &Rays<'_>, to: &mut T, pace: &Pace) -> Result<(), Error> {
         self.with_room(|room| {
             if rays.len() >= LEAST_STREAM {
-                return self.level.run(Streams::<_, ANY> { tracer: self, rays, take, room });
+                return self.level.run(Together::<_, ANY>::new(self, rays, to, room, pace));
             }
             for index in 0..rays.len() {
                 let frame = rays.frame(index, &self.structure.domain)?;
-                take(index, &frame, self.level.run(One::<ANY> { tracer: self, frame: &frame, room }));
+                to.take(index, &frame, self.level.run(One::<ANY> { tracer: self, frame: &frame, room }));
             }
             Ok(())
         })
@@ -110,15 +106,12 @@ const LEAST_STREAM: usize = 64;
 
 /// What traversals need to remember things in, reused from batch to batch.
 #[derive(Default)]
-struct Room {
-    stack: Vec<Entry>,
-    bins: [Bin; 8],
-    lists: Lists,
-}
-
-#[inline(always)]
-fn in_ray_units(frame: &Frame, hit: Hit) -> Hit {
-    if hit.primitive == MISS { Hit::MISS } else { Hit { t: frame.parameter(hit.t), ..hit } }
+pub struct Room {
+    pub stack: Vec<Entry>,
+    pub bins: [Bin; 8],
+    pub lists: Lists,
+    pub tile: Box<Tile>,
+    pub visits: Vec<Visit>,
 }
 
 /// A ray that walks alone; the result is in the frame's units.
@@ -136,14 +129,6 @@ struct Singles<'a, F, P> {
     take: F,
     room: &'a mut Room,
     probe: PhantomData<P>,
-}
-
-/// Rays that walk together, and what to do with the index, frame and hit (in the frame's units) of each.
-struct Streams<'a, F, const ANY: bool> {
-    tracer: Tracer<'a>,
-    rays: &'a Rays<'a>,
-    take: F,
-    room: &'a mut Room,
 }
 
 /// The table that picks a loop's instance, once a batch.
@@ -184,15 +169,6 @@ impl<F: FnMut(usize, &Frame, Hit, P), P: Probe + Default> Kernel for Singles<'_,
     }
 }
 
-impl<F: FnMut(usize, &Frame, Hit), const ANY: bool> Kernel for Streams<'_, F, ANY> {
-    type Output = Result<(), Error>;
-
-    #[inline(always)]
-    fn run<S: Simd>(self, simd: S) -> Self::Output {
-        pick_instance!(self, simd)
-    }
-}
-
 impl<F: FnMut(usize, &Frame, Hit, P), P: Probe + Default> Singles<'_, F, P> {
     #[inline(always)]
     fn each<S: Simd, const GRIDS: bool>(mut self, simd: S) -> Result<(), Error> {
@@ -208,87 +184,6 @@ impl<F: FnMut(usize, &Frame, Hit, P), P: Probe + Default> Singles<'_, F, P> {
     }
 }
 
-impl<F: FnMut(usize, &Frame, Hit), const ANY: bool> Streams<'_, F, ANY> {
-    #[inline(always)]
-    fn each<S: Simd, const GRIDS: bool>(mut self, simd: S) -> Result<(), Error> {
-        let Tracer { structure, mesh, .. } = self.tracer;
-        self.room.bins.iter_mut().for_each(Bin::clear);
-        let mut next = 0;
-        while let Some(octant) = self.fill(simd, &mut next)? {
-            let Room { stack, bins, lists } = &mut *self.room;
-            stream::trace::<S, GRIDS, ANY>(simd, structure, mesh, octant, &mut bins[octant], lists, stack);
-            self.answer(simd, octant);
-            self.room.bins[octant].clear();
-        }
-        Ok(())
-    }
-
-    /// Sort rays from `next` on into bins until one is full or no ray is left, and tell which bin to trace.
-    #[inline(always)]
-    fn fill<S: Simd>(&mut self, simd: S, next: &mut usize) -> Result<Option<usize>, Error> {
-        let count = self.rays.len();
-        let mut full = self.room.bins.iter().position(Bin::is_full);
-        while full.is_none() && *next < count {
-            let mut frames = [Frame::zeroed(); LANES];
-            let lanes = LANES.min(count - *next);
-            self.frames(simd, *next, &mut frames[..lanes])?;
-            for lane in 0..lanes {
-                let octant = frames[lane].octant();
-                self.room.bins[octant].push(*next + lane, &frames[lane]);
-                if self.room.bins[octant].is_full() {
-                    full = Some(octant);
-                }
-            }
-            *next += lanes;
-        }
-        Ok(full.or_else(|| self.room.bins.iter().position(|bin| !bin.is_empty())))
-    }
-
-    /// The frames of the rays from `first` on.
-    #[inline(always)]
-    fn frames<S: Simd>(&self, simd: S, first: usize, frames: &mut [Frame]) -> Result<(), Error> {
-        let domain = &self.tracer.structure.domain;
-        if let Some(eight) = frames.first_chunk_mut()
-            && setup::eight(simd, self.rays, first, domain, eight)
-        {
-            return Ok(());
-        }
-        for (lane, frame) in frames.iter_mut().enumerate() {
-            *frame = self.rays.frame(first + lane, domain)?;
-        }
-        Ok(())
-    }
-
-    /// Tell what the rays of a bin hit.
-    #[inline(always)]
-    fn answer<S: Simd>(&mut self, simd: S, octant: usize) {
-        let bin = &self.room.bins[octant];
-        if !ANY {
-            bin.warm(simd, self.tracer.mesh);
-        }
-        let (mut answers, mut slot) = (Answers::EMPTY, 0);
-        while slot < bin.len() {
-            while slot < bin.len() && !answers.is_full() {
-                let (index, frame, best) = bin.ray(slot);
-                if ANY || best.primitive == MISS {
-                    (self.take)(index, frame, Hit { primitive: best.primitive, ..Hit::MISS });
-                } else {
-                    answers.push(slot, frame, self.tracer.mesh, best.primitive);
-                }
-                slot += 1;
-            }
-            if ANY {
-                continue;
-            }
-            let (hits, count) = answers.take(simd);
-            for &(slot, hit) in &hits[..count] {
-                let (index, frame, _) = bin.ray(slot);
-                (self.take)(index, frame, hit);
-            }
-        }
-    }
-}
-
 /// Rays between two looks at the job: a few milliseconds of work even on slow structures.
 const PART: usize = 1 << 13;
 
@@ -298,7 +193,9 @@ impl Tracer<'_> {
     /// # Errors
     /// As there, and [`Error::Cancelled`].
     pub fn closest_parallel(self, rays: &Rays<'_>, hits: HitsMut<'_>, threads: usize, job: &Job) -> Result<(), Error> {
-        self.parallel(rays, hits.parts(PART), threads, job, |rays, mut hits| self.closest(&rays, &mut hits))
+        let pace = Pace::default();
+        let work = |rays: Rays<'_>, mut hits: HitsMut<'_>| self.silent::<_, false>(&rays, &mut hits, &pace);
+        self.parallel(rays, hits.parts(PART), threads, job, work)
     }
 
     /// [`Tracer::occluded`] on several threads; 0 means all.

@@ -94,7 +94,7 @@ mod tests {
     /// Triangles around the z axis, so that rays along it hit some, miss some, and meet edges and corners of others.
     fn triangles() -> Vec<Triangle> {
         let number = |seed: u32| (seed.wrapping_mul(2_654_435_761) >> 28) as f32 / 4.0 - 1.75;
-        let odd = |seed: u32| if seed % 3 == 0 { 0.0 } else { 1e-3 * (seed % 7) as f32 };
+        let odd = |seed: u32| if seed.is_multiple_of(3) { 0.0 } else { 1e-3 * (seed % 7) as f32 };
         (0..400u32)
             .map(|i| {
                 [0, 1, 2]

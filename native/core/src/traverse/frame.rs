@@ -106,8 +106,17 @@ impl Frame {
         Some(Self { scale, ..Self::near(ray.origin, local, reach, direction, interval, domain) })
     }
 
+    /// The frame of a ray whose origin is near; `local` is it relative to the centre, `reach` the largest component of
+    /// that, and direction and interval are scaled already.
     #[inline(always)]
-    fn near(origin: Vec3, local: Vec3, reach: f32, direction: Vec3, (tmin, tmax): (f32, f32), domain: &Domain) -> Self {
+    pub(super) fn near(
+        origin: Vec3,
+        local: Vec3,
+        reach: f32,
+        direction: Vec3,
+        (tmin, tmax): (f32, f32),
+        domain: &Domain,
+    ) -> Self {
         let margin = DILATION * (reach + domain.half_extent) + f32::MIN_POSITIVE;
         let parallel = direction.abs().cmplt(Vec3::splat(PARALLEL));
         let inverse = Vec3::select(parallel, Vec3::splat(PARALLEL).copysign(direction), direction).recip();

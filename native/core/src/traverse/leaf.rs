@@ -12,7 +12,7 @@ use crate::{
 #[derive(Debug, Clone, Copy)]
 pub struct Best {
     /// The parameter is at least this.
-    low: f32,
+    pub low: f32,
     /// The parameter is at most this; nothing beyond is of interest.
     pub high: f32,
     /// The triangle, or [`MISS`].
@@ -61,7 +61,7 @@ impl Best {
 }
 
 #[inline(always)]
-fn corners(mesh: &Mesh, triangle: u32) -> [[f32; 3]; 3] {
+pub fn corners(mesh: &Mesh, triangle: u32) -> [[f32; 3]; 3] {
     mesh.corners(triangle).map(|corner| corner.to_array())
 }
 

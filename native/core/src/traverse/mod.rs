@@ -4,7 +4,6 @@ mod answers;
 mod batch;
 mod crossing;
 mod dda;
-#[allow(dead_code)] // Whoever knows its triangle needs no verdict; the traversers that come next do.
 mod exact;
 pub mod frame;
 mod irregular;
@@ -12,9 +11,12 @@ mod kernel;
 mod leaf;
 mod lists;
 mod nest;
+mod pace;
 pub mod probe;
 mod setup;
 mod stream;
 mod tetrahedra;
+mod tile;
+mod together;
 
 pub use batch::Tracer;

@@ -1,0 +1,206 @@
+//! Blocks of triangles against groups of rays.
+
+use super::{
+    ROUNDING,
+    rays::{Tile, absolute},
+};
+use crate::{
+    Mesh,
+    simd::Simd,
+    triangle::{Block, LANES},
+};
+
+/// Eight triangles as planes through the origin. Axes are the tile's; see the module's text for the rest.
+#[derive(Debug, Clone, Copy, Default)]
+#[repr(C, align(64))]
+pub struct Planes {
+    /// Normals of the planes through the edges opposite to the corners, turned inwards for rays that meet the front.
+    edge: [[[f32; LANES]; 3]; 3],
+    /// Normals of the triangles, turned likewise.
+    face: [[f32; LANES]; 3],
+    /// Volumes V.
+    volume: [f32; LANES],
+    /// Edge functions up to this decide nothing.
+    doubt: [f32; LANES],
+    /// Depths are off by this over the determinant.
+    blur: [f32; LANES],
+}
+
+type Vector<S> = [<S as Simd>::F32; 3];
+
+impl Planes {
+    /// The planes of a block.
+    #[inline(always)]
+    pub fn set<S: Simd>(&mut self, simd: S, tile: &Tile, block: &Block) {
+        let a = relative(simd, tile, &block.corner[0]);
+        let b = relative(simd, tile, &block.corner[1]);
+        let c = relative(simd, tile, &block.corner[2]);
+        let opposite = [difference(simd, b, c), difference(simd, c, a), difference(simd, a, b)];
+        let face = cross(simd, opposite[2], opposite[1]);
+        let volume = dot(simd, face, a);
+        let volume = simd.mul(volume, simd.splat(tile.sign));
+        let zero = simd.splat(0.0);
+        let side = simd.if_ge(volume, zero, simd.splat(1.0), simd.splat(-1.0));
+
+        let mut extent = zero;
+        for edge in opposite {
+            extent = simd.max(largest(simd, edge), extent);
+        }
+        let reach = simd.add(largest(simd, a), extent);
+        let tiny = simd.splat(f32::MIN_POSITIVE);
+        let area = simd.mul(extent, reach);
+        let blur = simd.mul_add(simd.mul(extent, area), simd.splat(tile.slack.blur), tiny);
+        let doubt = simd.mul_add(area, simd.splat(tile.slack.doubt), tiny);
+        let volume = absolute(simd, volume);
+        self.doubt = simd.store(simd.if_ge(volume, blur, doubt, simd.splat(f32::INFINITY)));
+        self.blur = simd.store(blur);
+        self.volume = simd.store(volume);
+        store(simd, scaled(simd, face, side), &mut self.face);
+        for (e, (p, q)) in [(b, c), (c, a), (a, b)].into_iter().enumerate() {
+            let sum = [simd.add(p[0], q[0]), simd.add(p[1], q[1]), simd.add(p[2], q[2])];
+            store(simd, cross(simd, sum, scaled(simd, opposite[e], side)), &mut self.edge[e]);
+        }
+    }
+
+    /// Test the first `count` triangles against groups.
+    #[inline(always)]
+    pub fn test<S: Simd>(&self, simd: S, tile: &mut Tile, mesh: &Mesh, block: &Block, count: u32, groups: u32) {
+        let mut groups = groups;
+        let mut changed = false;
+        while groups != 0 {
+            let group = groups.trailing_zeros() as usize % super::GROUPS;
+            groups &= groups - 1;
+            let mut lanes = self.near(simd, tile, group) & ((1 << count) - 1);
+            let mut approached = false;
+            while lanes != 0 {
+                let lane = lanes.trailing_zeros() as usize % LANES;
+                lanes &= lanes - 1;
+                approached |= self.triangle(simd, tile, mesh, group, block, lane);
+            }
+            if approached {
+                tile.approach(group);
+            }
+            changed |= approached;
+        }
+        if changed {
+            tile.update_far();
+        }
+    }
+
+    /// The triangles that may be met by some ray with slopes between those of a group.
+    #[inline(always)]
+    fn near<S: Simd>(&self, simd: S, tile: &Tile, group: usize) -> u32 {
+        let group = &tile.groups[group];
+        let middle = [simd.splat(group.middle[0]), simd.splat(group.middle[1])];
+        let half = [simd.splat(group.half[0]), simd.splat(group.half[1])];
+        let mut least = simd.splat(f32::INFINITY);
+        for edge in &self.edge {
+            let [x, y, z] = [simd.load(&edge[0]), simd.load(&edge[1]), simd.load(&edge[2])];
+            let most = simd.mul_add(x, middle[0], simd.mul_add(y, middle[1], z));
+            let most = simd.mul_add(absolute(simd, x), half[0], most);
+            let most = simd.mul_add(absolute(simd, y), half[1], most);
+            least = simd.min(most, least);
+        }
+        simd.le(simd.splat(0.0), simd.add(least, simd.load(&self.doubt)))
+    }
+
+    /// Test one triangle against a group; true where some best hit came nearer.
+    #[inline(always)]
+    fn triangle<S: Simd>(
+        &self,
+        simd: S,
+        tile: &mut Tile,
+        mesh: &Mesh,
+        group: usize,
+        block: &Block,
+        lane: usize,
+    ) -> bool {
+        let rays = &tile.groups[group];
+        let slope = [simd.load(&rays.slope[0]), simd.load(&rays.slope[1])];
+        let doubt = simd.splat(self.doubt[lane]);
+        let mut least = simd.splat(f32::INFINITY);
+        for edge in &self.edge {
+            least = simd.min(value(simd, edge, lane, slope), least);
+        }
+        let possible = simd.le(simd.splat(0.0), simd.add(least, doubt));
+        if possible == 0 {
+            return false;
+        }
+
+        let nothing = simd.splat(f32::NAN);
+        let determinant = value(simd, &self.face, lane, slope);
+        let inverse = simd.div(simd.splat(1.0), determinant);
+        let depth = simd.mul(simd.splat(self.volume[lane]), inverse);
+        let error = simd.mul_add(depth, simd.splat(8.0 * ROUNDING), simd.mul(simd.splat(self.blur[lane]), inverse));
+        let error = simd.if_ge(determinant, simd.mul(doubt, simd.splat(1.5)), error, nothing);
+        let (from, to) = (simd.sub(depth, error), simd.add(depth, error));
+        let (near, low) = (simd.load(&rays.near), simd.load(&rays.low));
+        let (high, best) = (simd.load(&rays.high), simd.load(&rays.best));
+        let certain = simd.if_ge(from, near, simd.if_ge(least, doubt, to, nothing), nothing);
+        let accepted = simd.le(certain, low);
+        let beyond = simd.le(high, from) | simd.le(to, near);
+        let winner = f32::from_bits(block.primitive[lane]);
+        if accepted != 0 {
+            let rays = &mut tile.groups[group];
+            rays.low = simd.store(simd.if_ge(low, certain, from, low));
+            rays.high = simd.store(simd.if_ge(low, certain, to, high));
+            rays.best = simd.store(simd.if_ge(low, certain, simd.splat(winner), best));
+        }
+        let unclear = possible & !accepted & !beyond;
+        let decided = unclear != 0 && tile.decide(simd, mesh, group, unclear, block, lane);
+        decided || accepted != 0
+    }
+}
+
+#[inline(always)]
+fn relative<S: Simd>(simd: S, tile: &Tile, corner: &[[f32; LANES]; 3]) -> Vector<S> {
+    let [x, y, z] = tile.axes;
+    let origin = tile.origin;
+    [
+        simd.sub(simd.load(&corner[x]), simd.splat(origin[x])),
+        simd.sub(simd.load(&corner[y]), simd.splat(origin[y])),
+        simd.sub(simd.load(&corner[z]), simd.splat(origin[z])),
+    ]
+}
+
+/// q - p
+#[inline(always)]
+fn difference<S: Simd>(simd: S, q: Vector<S>, p: Vector<S>) -> Vector<S> {
+    [simd.sub(q[0], p[0]), simd.sub(q[1], p[1]), simd.sub(q[2], p[2])]
+}
+
+#[inline(always)]
+fn scaled<S: Simd>(simd: S, v: Vector<S>, by: S::F32) -> Vector<S> {
+    [simd.mul(v[0], by), simd.mul(v[1], by), simd.mul(v[2], by)]
+}
+
+#[inline(always)]
+fn cross<S: Simd>(simd: S, p: Vector<S>, q: Vector<S>) -> Vector<S> {
+    [
+        simd.mul_sub(p[1], q[2], simd.mul(p[2], q[1])),
+        simd.mul_sub(p[2], q[0], simd.mul(p[0], q[2])),
+        simd.mul_sub(p[0], q[1], simd.mul(p[1], q[0])),
+    ]
+}
+
+#[inline(always)]
+fn dot<S: Simd>(simd: S, p: Vector<S>, q: Vector<S>) -> S::F32 {
+    simd.mul_add(p[0], q[0], simd.mul_add(p[1], q[1], simd.mul(p[2], q[2])))
+}
+
+#[inline(always)]
+fn largest<S: Simd>(simd: S, v: Vector<S>) -> S::F32 {
+    simd.max(simd.max(absolute(simd, v[0]), absolute(simd, v[1])), absolute(simd, v[2]))
+}
+
+#[inline(always)]
+fn store<S: Simd>(simd: S, v: Vector<S>, to: &mut [[f32; LANES]; 3]) {
+    *to = [simd.store(v[0]), simd.store(v[1]), simd.store(v[2])];
+}
+
+/// The product of a normal and eight directions.
+#[inline(always)]
+fn value<S: Simd>(simd: S, normal: &[[f32; LANES]; 3], lane: usize, slope: [S::F32; 2]) -> S::F32 {
+    let [x, y, z] = [simd.splat(normal[0][lane]), simd.splat(normal[1][lane]), simd.splat(normal[2][lane])];
+    simd.mul_add(x, slope[0], simd.mul_add(y, slope[1], z))
+}

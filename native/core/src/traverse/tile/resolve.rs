@@ -1,0 +1,206 @@
+//! Where a tile asks the exact test: for rays of which the planes decide nothing, below nodes that rays visit one by
+//! one, and for the parameters and weights of all winners.
+
+use super::{GROUPS, ROUNDING, rays::Tile};
+use crate::{
+    Mesh,
+    accel::structure::{NodeRef, Structure, View},
+    ray::{Eight, Hit, MISS},
+    simd::Simd,
+    traverse::{
+        exact::Exact,
+        frame::Frame,
+        kernel::{self, Entry},
+        leaf::{Best, Search, corners},
+        probe::Silent,
+    },
+    triangle::{self, Block, LANES},
+};
+
+/// More than the share by which rounding is off where depths become parameters, or parameters depths.
+const CONVERSION: f32 = 4.0 * ROUNDING;
+
+impl Tile {
+    /// Let the exact test decide about a triangle for some lanes of a group; true where some best hit came nearer.
+    #[inline(always)]
+    pub fn decide<S: Simd>(
+        &mut self,
+        simd: S,
+        mesh: &Mesh,
+        group: usize,
+        lanes: u32,
+        block: &Block,
+        triangle: usize,
+    ) -> bool {
+        if self.slanted >> group & 1 == 1 {
+            return self.decide_one_by_one(mesh, group, lanes, block, triangle);
+        }
+        let mut corners = [[simd.splat(0.0); 3]; 3];
+        for c in 0..3 {
+            for k in 0..3 {
+                let axis = self.axes[k];
+                corners[c][k] = simd.sub(simd.splat(block.corner[c][axis][triangle]), simd.splat(self.origin[axis]));
+            }
+        }
+        let exact = self.exact(simd, group, &corners);
+        let t = simd.store(exact.t);
+        let [tmin, tmax] = self.exactly[group].interval;
+        let (hit, unclear) = (lanes & exact.hit, lanes & exact.unclear);
+        let mut nearer = false;
+        for lane in (0..LANES).filter(|lane| hit >> lane & 1 == 1) {
+            let hit = Hit { t: t[lane], primitive: block.primitive[triangle], ..Hit::MISS };
+            if tmin[lane] <= hit.t && hit.t <= tmax[lane] {
+                nearer |= self.offer(mesh, group, lane, hit);
+            }
+        }
+        nearer | (unclear != 0 && self.decide_one_by_one(mesh, group, unclear, block, triangle))
+    }
+
+    /// The exact test of the rays of a group that is not slanted.
+    #[inline(always)]
+    fn exact<S: Simd>(&self, simd: S, group: usize, corners: &[[S::F32; 3]; 3]) -> Exact<S> {
+        let slope = &self.groups[group].slope;
+        let depth = simd.load(&self.exactly[group].direction[self.axes[2]]);
+        Exact::new(simd, corners, [simd.load(&slope[0]), simd.load(&slope[1])], depth)
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn decide_one_by_one(&mut self, mesh: &Mesh, group: usize, lanes: u32, block: &Block, triangle: usize) -> bool {
+        let mut nearer = false;
+        for lane in (0..LANES).filter(|lane| lanes >> lane & 1 == 1) {
+            if let Some(hit) = block.intersect(triangle, &self.frame(group, lane)) {
+                nearer |= self.offer(mesh, group, lane, hit);
+            }
+        }
+        nearer
+    }
+
+    /// Make an exact hit the best of its ray, if it is; only its parameter and triangle matter.
+    #[inline(never)]
+    fn offer(&mut self, mesh: &Mesh, group: usize, lane: usize, hit: Hit) -> bool {
+        let [from, to] = self.depths(group, lane, [hit.t; 2]);
+        let rays = &self.groups[group];
+        let is_nearer = to < rays.low[lane]
+            || (from <= rays.high[lane] && hit.precedes(&self.best(mesh, group, lane, &self.frame(group, lane))));
+        if is_nearer {
+            self.keep(group, lane, hit.primitive, [from, to]);
+        }
+        is_nearer
+    }
+
+    fn keep(&mut self, group: usize, lane: usize, primitive: u32, [from, to]: [f32; 2]) {
+        let rays = &mut self.groups[group];
+        rays.low[lane] = from;
+        rays.high[lane] = to;
+        rays.best[lane] = f32::from_bits(primitive);
+    }
+
+    /// From which depth to which a hit is between two parameters.
+    fn depths(&self, group: usize, lane: usize, [from, to]: [f32; 2]) -> [f32; 2] {
+        let slant = self.exactly[group].direction[self.axes[2]][lane].abs();
+        [from * slant * (1.0 - CONVERSION), to * slant * (1.0 + CONVERSION)]
+    }
+
+    /// The best hit of a ray, in the frame's units, or the end of its interval.
+    fn best(&self, mesh: &Mesh, group: usize, lane: usize, frame: &Frame) -> Hit {
+        let primitive = self.groups[group].best[lane].to_bits();
+        if primitive == MISS {
+            return Hit { t: frame.tmax, ..Hit::MISS };
+        }
+        triangle::evaluate(frame, corners(mesh, primitive), primitive)
+    }
+
+    /// Go on below a node ray by ray.
+    #[inline(always)]
+    pub fn one_by_one<S: Simd, const GRIDS: bool>(
+        &mut self,
+        simd: S,
+        structure: &Structure,
+        mesh: &Mesh,
+        node: (View<'_>, NodeRef),
+        groups: u32,
+        stack: &mut [Entry],
+    ) {
+        for group in (0..GROUPS).filter(|group| groups >> group & 1 == 1) {
+            for lane in 0..LANES {
+                let frame = self.frame(group, lane);
+                let before = self.as_searched(group, lane, &frame);
+                let mut search = Search { simd, frame: &frame, mesh, probe: &mut Silent, best: before };
+                kernel::trace_below::<S, Silent, GRIDS, false>(&mut search, structure, node, stack);
+                let Best { low, high, primitive } = search.best;
+                if primitive != before.primitive {
+                    self.keep(group, lane, primitive, self.depths(group, lane, [low, high]));
+                }
+            }
+            self.approach(group);
+        }
+        self.update_far();
+    }
+
+    /// The best hit of a ray, as one that walks alone knows it.
+    fn as_searched(&self, group: usize, lane: usize, frame: &Frame) -> Best {
+        let rays = &self.groups[group];
+        let primitive = rays.best[lane].to_bits();
+        if primitive == MISS {
+            return Best::none(frame.tmax);
+        }
+        let slant = frame.direction[self.axes[2]].abs();
+        let [low, high] = [rays.low[lane] / slant * (1.0 - CONVERSION), rays.high[lane] / slant * (1.0 + CONVERSION)];
+        Best { low, high, primitive }
+    }
+
+    /// The best hits of a group, in the rays' own units.
+    #[inline(always)]
+    pub fn hits<S: Simd>(&self, simd: S, mesh: &Mesh, group: usize) -> Eight {
+        let mut hits = Eight::MISSES;
+        let mut met = 0;
+        for (lane, best) in self.groups[group].best.iter().enumerate() {
+            met |= u32::from(best.to_bits() != MISS) << lane;
+        }
+        if met != 0 && self.slanted >> group & 1 == 1 {
+            self.set_one_by_one(mesh, group, &mut hits);
+        } else if met != 0 {
+            self.set_together(simd, mesh, group, met, &mut hits);
+        }
+        hits
+    }
+
+    #[inline(never)]
+    fn set_one_by_one(&self, mesh: &Mesh, group: usize, hits: &mut Eight) {
+        for lane in 0..LANES {
+            let frame = self.frame(group, lane);
+            let hit = self.best(mesh, group, lane, &frame);
+            if hit.primitive != MISS {
+                hits.set(lane, Hit { t: frame.parameter(hit.t), ..hit });
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn set_together<S: Simd>(&self, simd: S, mesh: &Mesh, group: usize, met: u32, hits: &mut Eight) {
+        let mut corners = [[[0.0; LANES]; 3]; 3];
+        for lane in (0..LANES).filter(|lane| met >> lane & 1 == 1) {
+            hits.primitive[lane] = self.groups[group].best[lane].to_bits();
+            for (c, corner) in mesh.corners(hits.primitive[lane]).iter().enumerate() {
+                for k in 0..3 {
+                    corners[c][k][lane] = corner[k];
+                }
+            }
+        }
+        let [mut a, mut b, mut c] = [[simd.splat(0.0); 3]; 3];
+        for k in 0..3 {
+            let origin = simd.splat(self.origin[self.axes[k]]);
+            a[k] = simd.sub(simd.load(&corners[0][self.axes[k]]), origin);
+            b[k] = simd.sub(simd.load(&corners[1][self.axes[k]]), origin);
+            c[k] = simd.sub(simd.load(&corners[2][self.axes[k]]), origin);
+        }
+        let exact = self.exact(simd, group, &[a, b, c]);
+        hits.t = simd.store(simd.mul(exact.t, simd.load(&self.exactly[group].scale)));
+        hits.u = simd.store(exact.u);
+        hits.v = simd.store(exact.v);
+        for lane in (0..LANES).filter(|lane| met >> lane & 1 == 0) {
+            hits.set(lane, Hit::MISS);
+        }
+    }
+}
