@@ -1,5 +1,6 @@
 """The acceleration methods: their native names, labels and descriptions. No bpy."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 
@@ -18,7 +19,37 @@ METHODS: tuple[Method, ...] = (
         "Bounding volume hierarchy split at the median triangle, the axis cycling through X, Y and Z",
     ),
     Method(
+        "bvh-median+reinsert",
+        "BVH (Median Split, Reinserted)",
+        "The same, its subtrees then moved to where they make boxes smaller",
+    ),
+    Method(
         "bvh-sah", "BVH (SAH)", "Bounding volume hierarchy split where the surface area heuristic expects least work"
+    ),
+    Method(
+        "bvh-sah+reinsert",
+        "BVH (SAH, Reinserted)",
+        "The same, its subtrees then moved to where they make boxes smaller",
+    ),
+    Method(
+        "sbvh",
+        "BVH (Spatial Splits)",
+        "Surface area heuristic that cuts triangles where boxes would overlap: slow to build, fast to trace",
+    ),
+    Method(
+        "sbvh+reinsert",
+        "BVH (Spatial Splits, Reinserted)",
+        "The same, its subtrees then moved to where they make boxes smaller",
+    ),
+    Method(
+        "ploc",
+        "BVH (Locally Ordered)",
+        "Bounding volume hierarchy from the triangles up, nearest neighbours joined first",
+    ),
+    Method(
+        "ploc+reinsert",
+        "BVH (Locally Ordered, Reinserted)",
+        "The same, its subtrees then moved to where they make boxes smaller",
     ),
     Method(
         "bvh-clusters",
@@ -46,6 +77,11 @@ METHODS: tuple[Method, ...] = (
         "Bounding volume hierarchy whose evenly filled nodes, found with sample rays, become uniform grids",
     ),
     Method(
+        "hybrid-sequential",
+        "Hybrid (Sequential)",
+        "The same, with as many sample rays through each node as it takes to be certain of the verdict",
+    ),
+    Method(
         "hybrid",
         "Hybrid",
         "Lazy cells of a grid, a quick hierarchy, or a good one with grids where they pay: whichever the expected rays favour",
@@ -57,6 +93,15 @@ COMPARED_METHODS = ("bvh-median", "bvh-sah", "grid", "hybrid-sampled", "hybrid")
 
 METHOD_NAMES: tuple[str, ...] = tuple(method.name for method in METHODS)
 DEFAULT_METHOD = "hybrid"
+
+
+HYBRIDS = ("hybrid", "hapala", "fellner")
+GROUPS: dict[str, Callable[[str], bool]] = {
+    "Hierarchies": lambda name: not name.startswith(("grid", *HYBRIDS)),
+    "Grids": lambda name: name.startswith("grid"),
+    "Hybrids": lambda name: name.startswith(HYBRIDS),
+}
+"""Which methods stand together in lists, by heading."""
 
 
 def label(name: str) -> str:

@@ -11,7 +11,13 @@ LESS, MORE = -1, 1
 
 SHORT_LABELS = {
     "bvh-median": "Median",
+    "bvh-median+reinsert": "Median+R",
     "bvh-sah": "SAH",
+    "bvh-sah+reinsert": "SAH+R",
+    "sbvh": "Spatial",
+    "sbvh+reinsert": "Spatial+R",
+    "ploc": "Ordered",
+    "ploc+reinsert": "Ordered+R",
     "bvh-clusters": "Clusters",
     "lbvh": "Linear",
     "grid": "Grid",
@@ -21,6 +27,7 @@ SHORT_LABELS = {
     "hapala": "Tested",
     "fellner": "Nested",
     "hybrid-sampled": "Sampled",
+    "hybrid-sequential": "Sequential",
     "hybrid": "Hybrid",
 }
 """What the methods are called where there is little room."""

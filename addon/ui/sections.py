@@ -6,7 +6,7 @@ from typing import Any
 
 import bpy
 
-from .. import overlay, results
+from .. import methods, overlay, results
 from .. import results_table as table
 from ..operators import task
 
@@ -63,8 +63,11 @@ def draw_notes(layout: Layout, notes: Sequence[str], width: float) -> None:
 
 
 def draw_methods(layout: Layout, settings: Any) -> None:
-    """Which methods the buttons run."""
-    layout.column(heading="Methods").prop(settings, "methods")
+    """Which methods the buttons run, by kind."""
+    for heading, belongs in methods.GROUPS.items():
+        column = layout.column(heading=heading, align=True)
+        for name in filter(belongs, methods.METHOD_NAMES):
+            column.prop_enum(settings, "methods", name)
 
 
 def draw_settings(layout: Layout, settings: Any) -> None:

@@ -19,8 +19,6 @@ def test_compare_writes_pictures_and_report(blender: Blender, blend: Path, tmp_p
     assert [method["name"] for method in report["methods"]] == [
         "bvh-median",
         "bvh-sah",
-        "bvh-clusters",
-        "lbvh",
         "grid",
         "hybrid-sampled",
         "hybrid",

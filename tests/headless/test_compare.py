@@ -12,7 +12,7 @@ from PIL import Image
 
 from espalier import compare, cycles
 from espalier.errors import CancelledError, NoCameraError
-from espalier.methods import METHOD_NAMES
+from espalier.methods import COMPARED_METHODS
 from espalier.run import Options
 from espalier_scenes import catalogue
 
@@ -38,7 +38,7 @@ def test_a_comparison_has_all_methods_cycles_and_pictures_that_look_alike(scene:
     told: list[tuple[float, str]] = []
     outcome = compare.run(scene, SMALL, progress=lambda *now: told.append(now))
     report = outcome.report
-    assert [method.name for method in report.methods] == list(METHOD_NAMES)
+    assert [method.name for method in report.methods] == list(COMPARED_METHODS)
     assert (report.scene.triangles, report.scene.instances) == (len(catalogue.find("cornell_box").mesh()[1]), 11 - 3)
     assert (report.image.width, report.image.height, report.image.samples, report.threads) == (48, 64, 4, 1)
     assert all(method.rays >= 48 * 64 * 4 for method in report.methods)

@@ -10,7 +10,7 @@ import espalier_rt
 import pytest
 
 from espalier import command_line, terminal
-from espalier.methods import METHOD_NAMES
+from espalier.methods import COMPARED_METHODS
 from espalier.study import command
 from espalier.study.plan import PAPER_SCENES
 
@@ -75,7 +75,7 @@ def test_an_unknown_name_lists_the_known_ones(capsys: pytest.CaptureFixture[str]
 def test_options_are_read_as_they_are_meant() -> None:
     parse = command_line._parser().parse_args
     plain = parse(["compare", "city"])
-    assert (plain.methods, plain.resolution, plain.samples, plain.threads) == (METHOD_NAMES, None, 1, 0)
+    assert (plain.methods, plain.resolution, plain.samples, plain.threads) == (COMPARED_METHODS, None, 1, 0)
     assert (plain.cycles, plain.frame, plain.out) == (True, None, None)
     full = parse(
         ["compare", "a.blend", "--methods=grid,bvh-sah,grid", "--resolution=640X480", "--no-cycles", "--frame=-3"]

@@ -2,7 +2,8 @@
 //! writes the plans, starts this, and shows what it prints, one JSON object a line.
 //!
 //! `espalier-bench race PLAN.json` measures; `espalier-bench hits PLAN.json` only counts the hits of the plan's
-//! rays, without Embree; `espalier-bench rays PLAN.json CLASS FILE` writes them; `espalier-bench work PLAN.json CLASS METHOD REPEATS` does what a class times, without
+//! rays, without Embree; `espalier-bench rays PLAN.json CLASS FILE` writes them; `espalier-bench steps PLAN.json
+//! METHODS` counts what rays do in trees; `espalier-bench work PLAN.json CLASS METHOD REPEATS` does what a class times, without
 //! Embree: the difference between two numbers of repeats is what instruments can count.
 
 mod arena;
@@ -15,6 +16,7 @@ mod rays;
 mod rivals;
 mod row;
 mod scene;
+mod steps;
 mod verify;
 
 use std::{path::Path, process::ExitCode};
@@ -34,8 +36,9 @@ fn main() -> ExitCode {
         ["work", plan, class, method, repeats] => {
             Plan::read(Path::new(plan)).and_then(|plan| work(&plan, class, method, repeats))
         }
+        ["steps", plan, methods] => Plan::read(Path::new(plan)).and_then(|plan| steps(&plan, methods)),
         _ => Err(Error::Plan(
-            "the arguments are: race PLAN, hits PLAN, rays PLAN CLASS FILE, or work PLAN CLASS METHOD REPEATS".into(),
+            "the arguments are: race PLAN, hits PLAN, rays PLAN CLASS FILE, steps PLAN METHODS, or work PLAN CLASS METHOD REPEATS".into(),
         )),
     };
     match result {
@@ -100,6 +103,15 @@ fn rays(plan: &Plan, name: &str, file: &Path) -> Result<(), Error> {
             best = result.map(|()| best.min(time))?;
         }
         println!("{}", json!({"method": name, "rays_per_second": rays.len() as f64 / best.as_secs_f64()}));
+    }
+    Ok(())
+}
+
+/// Steps and tests per ray of comma-separated methods.
+fn steps(plan: &Plan, methods: &str) -> Result<(), Error> {
+    let methods: Vec<Method> = methods.split(',').map(Method::from_name).collect::<Result<_, _>>()?;
+    for row in steps::rows(plan, &methods)? {
+        println!("{row}");
     }
     Ok(())
 }

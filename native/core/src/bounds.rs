@@ -26,6 +26,12 @@ impl Bounds {
         Self { lower: self.lower.min(other.lower), upper: self.upper.max(other.upper) }
     }
 
+    /// What lies in both; empty where nothing does.
+    #[inline]
+    pub fn intersection(&self, other: &Self) -> Self {
+        Self { lower: self.lower.max(other.lower), upper: self.upper.min(other.upper) }
+    }
+
     /// Whether no point is inside.
     pub fn is_empty(&self) -> bool {
         self.lower.cmpgt(self.upper).any()

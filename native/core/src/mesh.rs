@@ -7,6 +7,9 @@ use crate::{Error, bounds::Bounds, error};
 /// No coordinate may exceed this magnitude: squares of coordinates must stay finite in single precision.
 pub const MAX_COORDINATE: f32 = 1e18;
 
+/// More triangles, or references to triangles, cannot be told apart by the indices of a structure.
+pub const MOST_TRIANGLES: usize = 1 << 27;
+
 /// A triangle mesh whose every vertex is finite and whose every index is in range.
 #[derive(Debug)]
 pub struct Mesh {
@@ -98,9 +101,9 @@ fn check_vertices(vertices: &[Vec3]) -> Result<(), Error> {
 }
 
 fn check_triangles(triangles: &[[u32; 3]], vertex_count: usize) -> Result<(), Error> {
-    const MOST: usize = 1 << 27;
-    if triangles.len() > MOST {
-        return Err(Error::Mesh(format!("{} triangles; at most {MOST} fit: split the scene", triangles.len())));
+    if triangles.len() > MOST_TRIANGLES {
+        let count = triangles.len();
+        return Err(Error::Mesh(format!("{count} triangles; at most {MOST_TRIANGLES} fit: split the scene")));
     }
     let fault = triangles.iter().position(|t| t.iter().any(|&index| index as usize >= vertex_count));
     fault.map_or(Ok(()), |index| {

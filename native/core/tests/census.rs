@@ -58,7 +58,16 @@ fn boxes_are_as_many_as_the_census_counts() {
 
 #[test]
 fn a_hierarchy_refers_to_every_triangle_once() {
-    let hierarchies = [Method::BvhMedian, Method::BvhSah, Method::BvhClusters, Method::Lbvh];
+    let hierarchies = [
+        Method::BvhMedian,
+        Method::BvhMedianReinsert,
+        Method::BvhSah,
+        Method::BvhSahReinsert,
+        Method::Ploc,
+        Method::PlocReinsert,
+        Method::BvhClusters,
+        Method::Lbvh,
+    ];
     for accelerator in accelerators().iter().filter(|a| hierarchies.contains(&a.method())) {
         assert_eq!(accelerator.census().references, accelerator.mesh().solid().len());
     }

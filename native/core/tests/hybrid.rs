@@ -17,7 +17,7 @@ use espalier_core::{
     },
 };
 
-const HYBRIDS: [Method; 2] = [Method::HybridSampled, Method::Hybrid];
+const HYBRIDS: [Method; 3] = [Method::HybridSampled, Method::HybridSequential, Method::Hybrid];
 
 fn mesh((vertices, triangles): (Vec<glam::Vec3>, Vec<[u32; 3]>)) -> Arc<Mesh> {
     Arc::new(Mesh::new(vertices, triangles).unwrap())
@@ -51,8 +51,9 @@ fn a_hollow_sphere_is_divided_first() {
 fn the_sampled_verdict_follows_from_its_evidence() {
     let config = Config { grid_least_triangles: 40, grid_most_triangles: 4000, ..Config::default() };
     for mesh in [mesh(soup(9000, 0.05)), mesh(soup(9000, 0.02)), mesh(icosphere(4))] {
-        let accelerator = build(&mesh, Method::HybridSampled, &config, 2);
-        for decision in accelerator.decisions() {
+        let [sampled, sequential] =
+            [Method::HybridSampled, Method::HybridSequential].map(|method| build(&mesh, method, &config, 2));
+        for decision in sampled.decisions().iter().chain(sequential.decisions()) {
             let window = (40..=4000).contains(&decision.primitives);
             assert_eq!(window, decision.rays > 0);
             let share = f64::from(decision.hits) / f64::from(decision.rays.max(1));
@@ -136,6 +137,21 @@ fn builds_do_not_depend_on_the_number_of_threads() {
             }
         }
     }
+}
+
+#[test]
+fn clear_nodes_take_few_rays_and_certainty_takes_more() {
+    let mesh = mesh(icosphere(5));
+    let rays = |confidence| -> Vec<u32> {
+        let config = Config { confidence, grid_least_triangles: 64, ..Config::default() };
+        let accelerator = build(&mesh, Method::HybridSequential, &config, 2);
+        accelerator.decisions().iter().map(|decision| decision.rays).filter(|&rays| rays > 0).collect()
+    };
+    let (some, sure) = (rays(0.8), rays(0.9999));
+    assert!(some.iter().chain(&sure).all(|&rays| (32..=4096).contains(&rays) && rays.is_power_of_two()));
+    assert!(some.iter().min() < some.iter().max(), "{some:?}");
+    let mean = |rays: &[u32]| rays.iter().sum::<u32>() as f64 / rays.len() as f64;
+    assert!(mean(&some) < mean(&sure), "{} {}", mean(&some), mean(&sure));
 }
 
 #[test]

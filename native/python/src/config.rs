@@ -2,7 +2,7 @@
 
 use espalier_core::{
     Config, Method,
-    accel::method::{Hierarchy, Lattice, Recipe},
+    accel::method::{Finish, Hierarchy, Lattice, Recipe},
 };
 use pyo3::{
     prelude::*,
@@ -25,8 +25,12 @@ enum Field {
 enum Readers {
     All,
     Sah,
+    Splits,
+    Clusters,
+    Reinserted,
     Grids,
     Samples,
+    Sequential,
     Window,
     Sampled,
     Gain,
@@ -41,12 +45,21 @@ impl Readers {
             Self::All => true,
             Self::Sah => matches!(
                 recipe,
-                Recipe::Hierarchy(Hierarchy::Sah) | Recipe::Hapala | Recipe::Fellner | Recipe::Cheapest
+                Recipe::Hierarchy(Hierarchy::Sah | Hierarchy::Spatial, _)
+                    | Recipe::Hapala
+                    | Recipe::Fellner
+                    | Recipe::Cheapest
             ),
-            Self::Grids => !matches!(recipe, Recipe::Hierarchy(_)),
+            Self::Splits => matches!(recipe, Recipe::Hierarchy(Hierarchy::Spatial, _)),
+            Self::Clusters => matches!(recipe, Recipe::Hierarchy(Hierarchy::LocallyOrdered, _)),
+            Self::Reinserted => matches!(recipe, Recipe::Hierarchy(_, Finish::Reinserted)),
+            Self::Grids => !matches!(recipe, Recipe::Hierarchy(..)),
             Self::Samples => matches!(recipe, Recipe::Sampled | Recipe::Cheapest | Recipe::Hapala),
-            Self::Window => matches!(recipe, Recipe::Sampled | Recipe::Cheapest | Recipe::Fellner),
-            Self::Sampled => recipe == Recipe::Sampled,
+            Self::Sequential => recipe == Recipe::Sequential,
+            Self::Window => {
+                matches!(recipe, Recipe::Sampled | Recipe::Sequential | Recipe::Cheapest | Recipe::Fellner)
+            }
+            Self::Sampled => matches!(recipe, Recipe::Sampled | Recipe::Sequential),
             Self::Gain => matches!(recipe, Recipe::Cheapest | Recipe::Fellner),
             Self::Cost => matches!(
                 recipe,
@@ -78,6 +91,10 @@ const FIELDS: &[(&str, Readers, Field)] = &[
     ("expected_rays", Readers::All, real!(expected_rays)),
     ("leaf_size", Readers::All, whole!(leaf_size)),
     ("sah_bins", Readers::Sah, whole!(sah_bins)),
+    ("split_budget", Readers::Splits, real!(split_budget)),
+    ("split_overlap", Readers::Splits, real!(split_overlap)),
+    ("cluster_radius", Readers::Clusters, whole!(cluster_radius)),
+    ("reinsert_rounds", Readers::Reinserted, whole!(reinsert_rounds)),
     ("grid_density", Readers::Grids, real!(grid_density)),
     ("grid_most_cells", Readers::Grids, whole!(grid_most_cells)),
     ("coarse_density", Readers::Recipe(Recipe::Lattice(Lattice::TwoLevel)), real!(coarse_density)),
@@ -91,6 +108,7 @@ const FIELDS: &[(&str, Readers, Field)] = &[
     ("sample_rays", Readers::Samples, real!(sample_rays)),
     ("sample_least", Readers::Samples, whole!(sample_least)),
     ("sample_most", Readers::Samples, whole!(sample_most)),
+    ("confidence", Readers::Sequential, real!(confidence)),
     ("hit_threshold", Readers::Sampled, real!(hit_threshold)),
     ("spread_threshold", Readers::Sampled, real!(spread_threshold)),
     ("grid_least_triangles", Readers::Window, whole!(grid_least_triangles)),

@@ -7,7 +7,7 @@ use super::{
     places::{self, Place, levels},
     structure::{Grid, NEST_STACK, NodeRef, Structure, Target, View},
 };
-use crate::{Mesh, bounds::Bounds, ray::MISS, triangle::LANES};
+use crate::{Mesh, bounds::Bounds, ray::MISS, traverse::frame::DILATION, triangle::LANES};
 
 /// Grids of at most this many pairs of cell and triangle are compared with brute force.
 pub(super) const BRUTE_FORCE: usize = 1 << 22;
@@ -20,7 +20,7 @@ pub fn assert_well_formed(structure: &Structure, mesh: &Mesh) {
     let places = levels(structure, &mesh.bounds()).flatten().filter(|place| place.lazy.is_none());
     let places: Vec<Place> = places.collect();
     assert_all_reached(structure, &places);
-    let mut owner = vec![None; mesh.triangles().len()];
+    let mut parts: Vec<(u32, usize)> = Vec::new();
     for (index, place) in places.iter().enumerate() {
         let primitives = match place.target {
             Target::Branch(node) => {
@@ -39,17 +39,21 @@ pub fn assert_well_formed(structure: &Structure, mesh: &Mesh) {
             }
             target => panic!("{target:?} was reached"),
         };
-        for primitive in primitives {
-            if place.cell.is_some() {
-                check_lattice::assert_contains_part(structure, mesh, place, primitive);
-                continue;
-            }
-            assert_contains(&place.bounds, &triangle_bounds(structure, mesh, primitive));
-            let before = owner[primitive as usize].replace(index);
-            assert_eq!(before, None, "triangle {primitive} stands in two places");
+        if place.cell.is_some() {
+            primitives
+                .iter()
+                .for_each(|&primitive| check_lattice::assert_contains_part(structure, mesh, place, primitive));
+            continue;
         }
+        parts.extend(primitives.into_iter().map(|primitive| (primitive, index)));
     }
-    assert_owned(mesh, &owner);
+    parts.sort_unstable();
+    for parts in parts.chunk_by(|a, b| a.0 == b.0) {
+        assert!(parts.is_sorted_by(|a, b| a.1 < b.1), "a place holds triangle {} twice", parts[0].0);
+        let boxes: Vec<Bounds> = parts.iter().map(|&(_, index)| places[index].bounds).collect();
+        assert_covered(structure, mesh, parts[0].0, &boxes);
+    }
+    assert_held(mesh, &parts);
     let needed = stack_need(structure, structure.view(), structure.root);
     assert!(structure.stack_size >= needed, "a stack of {} entries, {needed} needed", structure.stack_size);
 }
@@ -174,11 +178,43 @@ pub(super) fn cut(polygon: &[DVec3], side: impl Fn(DVec3) -> f64) -> Vec<DVec3> 
     rest
 }
 
-fn assert_owned(mesh: &Mesh, owner: &[Option<usize>]) {
-    let lost = mesh.solid().iter().find(|&&primitive| owner[primitive as usize].is_none());
+/// Every point of a triangle lies in the box of some place that holds it, but for what traversal makes up for by
+/// dilating boxes: see [`clip`](super::clip). One that stands in a single place lies in its box without exception.
+fn assert_covered(structure: &Structure, mesh: &Mesh, primitive: u32, boxes: &[Bounds]) {
+    if let [bounds] = boxes {
+        return assert_contains(bounds, &triangle_bounds(structure, mesh, primitive));
+    }
+    let slack = DILATION / 4.0 * structure.domain.half_extent + f32::MIN_POSITIVE;
+    let corners = mesh.corners(primitive).map(|corner| (corner - structure.domain.centre).as_dvec3());
+    let mut bare = vec![corners.to_vec()];
+    for bounds in boxes {
+        bare = bare.iter().flat_map(|polygon| outside(polygon, &bounds.dilated(slack))).collect();
+    }
+    assert!(bare.is_empty(), "triangle {primitive} is not in any of {boxes:?} at {bare:?}");
+}
+
+/// The parts of a convex polygon that lie outside a box.
+fn outside(polygon: &[DVec3], bounds: &Bounds) -> Vec<Vec<DVec3>> {
+    let (mut inside, mut parts) = (polygon.to_vec(), Vec::new());
+    for axis in 0..3 {
+        let (lower, upper) = (f64::from(bounds.lower[axis]), f64::from(bounds.upper[axis]));
+        for (sign, plane) in [(1.0, lower), (-1.0, upper)] {
+            let side = |point: DVec3| sign * (point[axis] - plane);
+            if inside.iter().any(|&point| side(point) < 0.0) {
+                parts.push(cut(&inside, |point| -side(point)));
+                inside = cut(&inside, side);
+            }
+        }
+    }
+    parts
+}
+
+fn assert_held(mesh: &Mesh, parts: &[(u32, usize)]) {
+    let mut held: Vec<u32> = parts.iter().map(|&(primitive, _)| primitive).collect();
+    held.dedup();
+    let lost = mesh.solid().iter().find(|primitive| held.binary_search(primitive).is_err());
     assert_eq!(lost, None, "a triangle is nowhere");
-    let held = owner.iter().filter(|owner| owner.is_some()).count();
-    assert_eq!(held, mesh.solid().len(), "triangles without area are held");
+    assert_eq!(held.len(), mesh.solid().len(), "triangles without area are held");
 }
 
 pub(super) fn triangle_bounds(structure: &Structure, mesh: &Mesh, primitive: u32) -> Bounds {

@@ -11,6 +11,18 @@ pub struct Config {
     /// Bins per axis of the binned surface area heuristic; 2 to 32. Wald, "On fast Construction of SAH-based Bounding
     /// Volume Hierarchies", RT 2007, finds 16 enough.
     pub sah_bins: usize,
+    /// References that spatial splits may add, as a share of the triangles; 0 to 8.
+    pub split_budget: f64,
+    /// Spatial splits are tried where the sides of the best other split overlap by more than this share of the scene's
+    /// surface; 0 to 1. Stich, Friedrich and Dietrich, "Spatial Splits in Bounding Volume Hierarchies", HPG 2009, find
+    /// 1e-5 a good compromise.
+    pub split_overlap: f64,
+    /// Neighbours on either side, along the Morton curve, among which locally ordered clustering looks for the nearest;
+    /// 1 to 128. Meister and Bittner, "Parallel Locally-Ordered Clustering for Bounding Volume Hierarchy Construction",
+    /// TVCG 24(3), 2018, find no gain beyond some tens.
+    pub cluster_radius: usize,
+    /// Rounds of reinsertion; 0 to 1000.
+    pub reinsert_rounds: usize,
     /// Grid cells per triangle; above 0, at most 64. Ize, Shirley and Parker, "Grid Creation Strategies for Efficient
     /// Ray Tracing", RT 2007.
     pub grid_density: f64,
@@ -47,6 +59,9 @@ pub struct Config {
     pub sample_least: u32,
     /// Most rays a node is sampled with.
     pub sample_most: u32,
+    /// How sure the sequential hybrid is of a verdict before it stops tracing rays through a node: the chance that more
+    /// rays would not turn it; 0.5 to 0.999999.
+    pub confidence: f64,
     /// A node is uniform where at least this share of its sample rays hit; 0 to 1. Measured: nodes of dense soups have
     /// 0.93 to 0.97, large nodes of scans (bunny, dragon), halls (Sponza) and hair 0.3 to 0.77. Below 0.8, scans turn
     /// into grids almost wholly, and are traced two to three times slower.
@@ -96,6 +111,10 @@ impl Default for Config {
         Self {
             leaf_size: LANES,
             sah_bins: 16,
+            split_budget: 1.0,
+            split_overlap: 1e-5,
+            cluster_radius: 16,
+            reinsert_rounds: 16,
             grid_density: 4.0,
             grid_most_cells: 1 << 27,
             coarse_density: 0.12,
@@ -111,6 +130,7 @@ impl Default for Config {
             sample_rays: 2048.0,
             sample_least: 32,
             sample_most: 1024,
+            confidence: 0.95,
             hit_threshold: 0.8,
             spread_threshold: 2.0,
             grid_least_triangles: 256,
@@ -128,6 +148,10 @@ impl Config {
         let ranges = [
             ("leaf_size", self.leaf_size as f64, 1.0, LANES as f64),
             ("sah_bins", self.sah_bins as f64, 2.0, MOST_BINS as f64),
+            ("split_budget", self.split_budget, 0.0, 8.0),
+            ("split_overlap", self.split_overlap, 0.0, 1.0),
+            ("cluster_radius", self.cluster_radius as f64, 1.0, 128.0),
+            ("reinsert_rounds", self.reinsert_rounds as f64, 0.0, 1000.0),
             ("grid_density", self.grid_density, 1e-3, 64.0),
             ("coarse_density", self.coarse_density, 1e-3, 64.0),
             ("fine_density", self.fine_density, 1e-3, 64.0),
@@ -142,6 +166,7 @@ impl Config {
             ("sample_rays", self.sample_rays, 0.0, 1e9),
             ("sample_least", f64::from(self.sample_least), 4.0, 1e6),
             ("sample_most", f64::from(self.sample_most), f64::from(self.sample_least), 1e6),
+            ("confidence", self.confidence, 0.5, 0.999_999),
             ("hit_threshold", self.hit_threshold, 0.0, 1.0),
             ("spread_threshold", self.spread_threshold, 0.0, f64::INFINITY),
             ("grid_least_triangles", self.grid_least_triangles as f64, 1.0, 1e9),

@@ -159,17 +159,31 @@ pub struct Sampled;
 
 impl Judge for Sampled {
     fn judge(&self, inquiry: &Inquiry<'_>, index: usize, decision: &mut Decision) -> Result<Option<BuiltGrid>, Error> {
-        let Config { hit_threshold, spread_threshold, .. } = *inquiry.config;
         let samples = inquiry.samples(index);
         let mut walker = Walker::new(inquiry.tree, inquiry.mesh, &inquiry.domain);
         let frames = inquiry.frames(&samples)?;
         let hits: Vec<bool> = frames.iter().map(|frame| walker.trace::<true>(index, frame).primitive != MISS).collect();
-        let evidence = samples.evidence(|ray| hits[ray]);
-        decision.observe(&evidence);
+        inquiry.by_evidence(index, &samples.evidence(|ray| hits[ray]), decision)
+    }
+}
+
+impl Inquiry<'_> {
+    /// The grid that the node becomes where its sample rays hit often and evenly.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`], [`Error::OutOfMemory`].
+    pub fn by_evidence(
+        &self,
+        index: usize,
+        evidence: &Evidence,
+        decision: &mut Decision,
+    ) -> Result<Option<BuiltGrid>, Error> {
+        let Config { hit_threshold, spread_threshold, .. } = *self.config;
+        decision.observe(evidence);
         decision.hit_threshold = hit_threshold as f32;
         decision.spread_threshold = spread_threshold as f32;
         let is_uniform = evidence.share() >= hit_threshold && evidence.spread <= spread_threshold;
-        is_uniform.then(|| inquiry.grid(index)).transpose()
+        is_uniform.then(|| self.grid(index)).transpose()
     }
 }
 

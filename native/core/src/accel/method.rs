@@ -1,5 +1,6 @@
 //! The methods: what each is called and what it builds, in one table.
 
+use super::pack::Opening;
 use crate::Error;
 
 /// How a structure is decided on: a row of [`ROWS`].
@@ -7,8 +8,20 @@ use crate::Error;
 pub enum Method {
     /// Median splits along cycling axes: the paper's benchmark.
     BvhMedian,
+    /// The same, then improved by reinsertion.
+    BvhMedianReinsert,
     /// Binned surface area heuristic.
     BvhSah,
+    /// The same, then improved by reinsertion.
+    BvhSahReinsert,
+    /// Surface area heuristic with spatial splits.
+    Sbvh,
+    /// The same, then improved by reinsertion.
+    SbvhReinsert,
+    /// Locally ordered clustering.
+    Ploc,
+    /// The same, then improved by reinsertion.
+    PlocReinsert,
     /// The same over clusters of neighbours.
     BvhClusters,
     /// Divided where Morton codes first differ.
@@ -27,6 +40,8 @@ pub enum Method {
     Fellner,
     /// The paper's hybrid: sampled rays decide which nodes become grids.
     HybridSampled,
+    /// The same on as many rays as certainty takes.
+    HybridSequential,
     /// Lazy cells of a grid, a quick hierarchy or a good one with grids in it, by least expected cost.
     Hybrid,
 }
@@ -38,6 +53,10 @@ pub enum Hierarchy {
     Median,
     /// [`sah`](super::sah)
     Sah,
+    /// [`sbvh`](super::sbvh)
+    Spatial,
+    /// [`ploc`](super::ploc)
+    LocallyOrdered,
 }
 
 /// Which kind of grid stands over everything.
@@ -51,11 +70,20 @@ pub enum Lattice {
     Tetrahedral,
 }
 
+/// What becomes of a binary tree before it is packed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Finish {
+    /// Nothing.
+    Plain,
+    /// [`reinsert`](super::reinsert)
+    Reinserted,
+}
+
 /// What a method builds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Recipe {
     /// A binary tree, packed.
-    Hierarchy(Hierarchy),
+    Hierarchy(Hierarchy, Finish),
     /// Straight to wide nodes, [over clusters](super::clustered).
     Clustered,
     /// Straight to wide nodes, [by Morton codes](super::lbvh).
@@ -70,8 +98,21 @@ pub enum Recipe {
     Fellner,
     /// A median tree, some of whose nodes become [grids](super::hybrid::Sampled).
     Sampled,
+    /// The same, by [another judge](super::sequential::Sequential).
+    Sequential,
     /// What is expected to [cost least](super::choice).
     Cheapest,
+}
+
+impl Recipe {
+    /// How a tree is packed: well where the build takes its time anyway.
+    pub(super) fn opening(self) -> Opening {
+        match self {
+            Self::Hierarchy(Hierarchy::Spatial | Hierarchy::LocallyOrdered, _)
+            | Self::Hierarchy(_, Finish::Reinserted) => Opening::Cheapest,
+            _ => Opening::Largest,
+        }
+    }
 }
 
 /// All that there is to know about a method.
@@ -89,8 +130,14 @@ struct Row {
 /// list of walks.
 #[rustfmt::skip]
 const ROWS: &[Row] = &[
-    row(Method::BvhMedian, "bvh-median", Recipe::Hierarchy(Hierarchy::Median), 2),
-    row(Method::BvhSah, "bvh-sah", Recipe::Hierarchy(Hierarchy::Sah), 2),
+    row(Method::BvhMedian, "bvh-median", Recipe::Hierarchy(Hierarchy::Median, Finish::Plain), 2),
+    row(Method::BvhMedianReinsert, "bvh-median+reinsert", Recipe::Hierarchy(Hierarchy::Median, Finish::Reinserted), 3),
+    row(Method::BvhSah, "bvh-sah", Recipe::Hierarchy(Hierarchy::Sah, Finish::Plain), 2),
+    row(Method::BvhSahReinsert, "bvh-sah+reinsert", Recipe::Hierarchy(Hierarchy::Sah, Finish::Reinserted), 3),
+    row(Method::Sbvh, "sbvh", Recipe::Hierarchy(Hierarchy::Spatial, Finish::Plain), 2),
+    row(Method::SbvhReinsert, "sbvh+reinsert", Recipe::Hierarchy(Hierarchy::Spatial, Finish::Reinserted), 3),
+    row(Method::Ploc, "ploc", Recipe::Hierarchy(Hierarchy::LocallyOrdered, Finish::Plain), 2),
+    row(Method::PlocReinsert, "ploc+reinsert", Recipe::Hierarchy(Hierarchy::LocallyOrdered, Finish::Reinserted), 3),
     row(Method::BvhClusters, "bvh-clusters", Recipe::Clustered, 3),
     row(Method::Lbvh, "lbvh", Recipe::Linear, 2),
     row(Method::Grid, "grid", Recipe::Grid, 2),
@@ -100,6 +147,7 @@ const ROWS: &[Row] = &[
     row(Method::Hapala, "hapala", Recipe::Hapala, 3),
     row(Method::Fellner, "fellner", Recipe::Fellner, 3),
     row(Method::HybridSampled, "hybrid-sampled", Recipe::Sampled, 3),
+    row(Method::HybridSequential, "hybrid-sequential", Recipe::Sequential, 3),
     row(Method::Hybrid, "hybrid", Recipe::Cheapest, 3),
 ];
 

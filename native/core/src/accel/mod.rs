@@ -8,8 +8,10 @@ pub mod check;
 mod check_lattice;
 mod check_lazy;
 pub mod choice;
+pub mod clip;
 pub mod clustered;
 pub mod clusters;
+pub mod collapse;
 pub mod config;
 pub mod content;
 pub mod decision;
@@ -27,6 +29,7 @@ pub mod lattice;
 mod lattices;
 pub mod lazy;
 pub mod lbvh;
+pub mod links;
 pub mod median;
 pub mod method;
 pub mod morton;
@@ -36,10 +39,15 @@ pub mod overlap;
 pub mod pack;
 pub mod places;
 pub mod planner;
+pub mod ploc;
 pub mod record;
+pub mod reinsert;
 pub mod sah;
 pub mod sample;
+pub mod sbvh;
+pub mod sequential;
 pub mod small;
+pub mod spatial;
 pub mod structure;
 pub mod subtree;
 pub mod sweep;
@@ -56,7 +64,7 @@ use self::{
     config::Config,
     decision::Decision,
     grid::BuiltGrid,
-    method::{Hierarchy, Recipe},
+    method::{Finish, Hierarchy, Recipe},
     structure::Structure,
     tree::{Kind, Tree, TreeNode},
 };
@@ -188,7 +196,8 @@ impl Builder<'_> {
     fn structure(&mut self, recipe: Recipe) -> Result<Structure, Error> {
         let tree = match recipe {
             Recipe::Cheapest => return self.cheapest(),
-            Recipe::Hierarchy(hierarchy) => self.hierarchy(hierarchy)?,
+            Recipe::Hierarchy(hierarchy, Finish::Plain) => self.hierarchy(hierarchy)?,
+            Recipe::Hierarchy(hierarchy, Finish::Reinserted) => self.reinserted(hierarchy)?,
             Recipe::Clustered => return self.clustered(),
             Recipe::Linear => return self.linear(),
             Recipe::Grid => self.single_grid()?,
@@ -196,15 +205,31 @@ impl Builder<'_> {
             Recipe::Hapala => self.grid_or_hierarchy()?,
             Recipe::Fellner => self.fellner()?,
             Recipe::Sampled => self.hybrid(Hierarchy::Median, &hybrid::Sampled)?,
+            Recipe::Sequential => self.hybrid(Hierarchy::Median, &sequential::Sequential)?,
         };
-        self.timed("pack", |this| pack::pack(&tree, this.mesh, this.job))
+        let opening = recipe.opening();
+        self.timed("pack", |this| pack::pack_opened(&tree, this.mesh, opening, this.job))
     }
 
     fn hierarchy(&mut self, hierarchy: Hierarchy) -> Result<Tree, Error> {
         match hierarchy {
             Hierarchy::Median => self.divided(&median::CyclingMedian { job: self.job }),
             Hierarchy::Sah => self.divided(&sah::BinnedSah { bins: self.config.sah_bins, job: self.job }),
+            Hierarchy::Spatial => {
+                let items = self.timed("bounds", |this| tree::items(this.mesh))?;
+                self.timed("split", |this| sbvh::build(items, this.mesh, this.config, this.job))
+            }
+            Hierarchy::LocallyOrdered => {
+                let items = self.timed("bounds", |this| tree::items(this.mesh))?;
+                self.timed("cluster", |this| ploc::build(items, &this.mesh.bounds(), this.config, this.job))
+            }
         }
+    }
+
+    fn reinserted(&mut self, hierarchy: Hierarchy) -> Result<Tree, Error> {
+        let tree = self.hierarchy(hierarchy)?;
+        let units = self.mesh.solid().len() as u64;
+        self.timed("reinsert", |this| reinsert::improve(tree, &this.mesh.bounds(), this.config, this.job, units))
     }
 
     fn divided(&mut self, split: &impl tree::Split) -> Result<Tree, Error> {

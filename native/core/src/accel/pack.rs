@@ -5,6 +5,7 @@
 use glam::Vec3;
 
 use super::{
+    collapse::Collapse,
     lattice::Lattices,
     structure::{Grid, NEST_STACK, Node, NodeRef, Structure},
     tree::{BuiltNest, Kind, Tree},
@@ -13,16 +14,35 @@ use crate::{
     Error, Job, Mesh, arena::Arena, bounds::Bounds, error, traverse::frame::Domain, triangle::Block, triangle::LANES,
 };
 
-/// Pack a tree.
+/// Which descendants of a branch stand side by side in its wide node.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Opening {
+    /// Whichever is largest is opened first: fast.
+    Largest,
+    /// Those with which all wide nodes together have the least area.
+    Cheapest,
+}
+
+/// Pack a tree, the largest children opened first.
 ///
 /// # Errors
 /// [`Error::Cancelled`], [`Error::OutOfMemory`].
 pub fn pack(tree: &Tree, mesh: &Mesh, job: &Job) -> Result<Structure, Error> {
+    pack_opened(tree, mesh, Opening::Largest, job)
+}
+
+/// Pack a tree.
+///
+/// # Errors
+/// [`Error::Cancelled`], [`Error::OutOfMemory`].
+pub fn pack_opened(tree: &Tree, mesh: &Mesh, opening: Opening, job: &Job) -> Result<Structure, Error> {
     let domain = Domain::new(&mesh.bounds());
     let leaves = tree.nodes.iter().filter(|node| node.kind == Kind::Leaf).count();
     let (blocks, nodes) = (Arena::with_capacity(leaves, "the leaves")?, Arena::with_capacity(leaves, "the nodes")?);
-    let (lattices, nested) = (Lattices::default(), 0);
-    let mut packer = Packer { tree, mesh, job, centre: domain.centre, nodes, blocks, lattices, nested };
+    let collapse = (opening == Opening::Cheapest).then(|| Collapse::new(tree)).transpose()?;
+    let surplus = tree.items.len().saturating_sub(mesh.solid().len()) as u64;
+    let (lattices, nested, centre) = (Lattices::default(), 0, domain.centre);
+    let mut packer = Packer { tree, mesh, job, centre, surplus, collapse, nodes, blocks, lattices, nested };
     let packed = if tree.nodes.is_empty() { Packed::EMPTY } else { packer.subtree(0)? };
     let Packer { nodes, blocks, lattices, .. } = packer;
     let stack_size = packed.stack_size;
@@ -47,6 +67,9 @@ struct Packer<'a> {
     mesh: &'a Mesh,
     job: &'a Job,
     centre: Vec3,
+    /// References beyond one a triangle, which the job does not count.
+    surplus: u64,
+    collapse: Option<Collapse<'a>>,
     nodes: Arena<Node>,
     blocks: Arena<Block>,
     lattices: Lattices,
@@ -64,7 +87,10 @@ impl Packer<'_> {
         };
         // What is in cells is counted where the nest is: items may be in many of them.
         if self.nested == 0 {
-            self.job.advance(u64::from(self.tree.nodes[index].count));
+            let count = u64::from(self.tree.nodes[index].count);
+            let uncounted = self.surplus.min(count);
+            self.surplus -= uncounted;
+            self.job.advance(count - uncounted);
         }
         Ok(packed)
     }
@@ -96,7 +122,7 @@ impl Packer<'_> {
         }
         let slot = self.nodes.len();
         self.nodes.push(Node::EMPTY);
-        let children = self.opened(index);
+        let children = self.collapse.as_ref().map_or_else(|| self.opened(index), |ways| ways.children(index));
         let mut node = Node::EMPTY;
         let mut deepest = 0;
         for (lane, &child) in children.iter().enumerate() {

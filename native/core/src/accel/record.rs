@@ -125,6 +125,13 @@ impl UnitCube {
         self.scale
     }
 
+    /// A mapped box.
+    #[inline(always)]
+    pub fn map(&self, bounds: &Bounds) -> BoundsA {
+        let mapped = |point: Vec3| (Vec3A::from(point) - self.lower) * self.scale;
+        BoundsA { lower: mapped(bounds.lower), upper: mapped(bounds.upper) }
+    }
+
     /// The mapped box of a triangle.
     #[inline(always)]
     pub fn bounds(&self, corners: [Vec3; 3]) -> BoundsA {

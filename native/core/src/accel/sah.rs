@@ -23,27 +23,28 @@ pub struct BinnedSah<'a> {
 pub const MOST_BINS: usize = 32;
 
 /// Below this depth medians are taken, which bounds the stack of every traversal.
-const MOST_DEPTH: usize = 64;
+pub(super) const MOST_DEPTH: usize = 64;
 
 /// Larger sets of items are binned in parallel, in parts of this size.
 const PART: usize = 1 << 15;
 
+/// Items and the box around them.
 #[derive(Clone, Copy)]
-struct Bin {
-    bounds: Bounds,
-    count: usize,
+pub(super) struct Bin {
+    pub(super) bounds: Bounds,
+    pub(super) count: usize,
 }
 
 impl Bin {
-    const EMPTY: Self = Self { bounds: Bounds::EMPTY, count: 0 };
+    pub(super) const EMPTY: Self = Self { bounds: Bounds::EMPTY, count: 0 };
 
-    fn add(&mut self, other: &Self) {
+    pub(super) fn add(&mut self, other: &Self) {
         self.bounds = self.bounds.union(&other.bounds);
         self.count += other.count;
     }
 
     /// Expected work, up to a constant.
-    fn cost(&self) -> f32 {
+    pub(super) fn cost(&self) -> f32 {
         if self.count == 0 { 0.0 } else { self.bounds.half_area() * self.count.div_ceil(LANES) as f32 }
     }
 }
@@ -51,30 +52,36 @@ impl Bin {
 type Bins = [[Bin; MOST_BINS]; 3];
 
 /// How centroids map to bins: `(centroid - lower) * scale`, along each axis; scale 0 where all centroids agree.
-struct Mapping {
+pub(super) struct Mapping {
     lower: [f32; 3],
     scale: [f32; 3],
     last: usize,
 }
 
-struct Plane {
+/// A plane between bins.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Plane {
     axis: usize,
     bin: usize,
-    cost: f32,
+    /// Expected work, up to a constant.
+    pub(super) cost: f32,
+    /// The boxes of what lies on either side.
+    pub(super) sides: [Bounds; 2],
 }
 
 impl Split for BinnedSah<'_> {
     fn split(&self, items: &mut [Item], depth: usize) -> usize {
         let plane = if depth < MOST_DEPTH { self.best_plane(items) } else { None };
         match plane {
-            Some((plane, mapping)) => partition(items, |item| mapping.bin(item, plane.axis) < plane.bin),
+            Some((plane, mapping)) => partition(items, |item| mapping.is_left(item, &plane)),
             None => median::halve(items, depth % 3, self.job),
         }
     }
 }
 
 impl BinnedSah<'_> {
-    fn best_plane(&self, items: &[Item]) -> Option<(Plane, Mapping)> {
+    /// The cheapest plane, if items can be told apart at all.
+    pub(super) fn best_plane(&self, items: &[Item]) -> Option<(Plane, Mapping)> {
         let mapping = Mapping::new(items, self.bins);
         let bins = if items.len() <= PART {
             mapping.fill(items)
@@ -113,6 +120,12 @@ impl Mapping {
         (((centroid(item, axis) - self.lower[axis]) * self.scale[axis]) as usize).min(self.last)
     }
 
+    /// Whether an item lies before a plane.
+    #[inline]
+    pub(super) fn is_left(&self, item: &Item, plane: &Plane) -> bool {
+        self.bin(item, plane.axis) < plane.bin
+    }
+
     fn fill(&self, items: &[Item]) -> Bins {
         let mut bins = [[Bin::EMPTY; MOST_BINS]; 3];
         for item in items {
@@ -133,23 +146,24 @@ fn merged(mut a: Bins, b: Bins) -> Bins {
 
 /// The cheapest plane along an axis with items on both of its sides.
 fn cheapest(axis: usize, bins: &[Bin]) -> Option<Plane> {
-    let mut right_cost = [0.0; MOST_BINS];
+    let mut rights = [Bin::EMPTY; MOST_BINS];
     let mut right = Bin::EMPTY;
     for bin in (1..bins.len()).rev() {
         right.add(&bins[bin]);
-        right_cost[bin] = if right.count == 0 { f32::INFINITY } else { right.cost() };
+        rights[bin] = right;
     }
     let mut left = Bin::EMPTY;
     let planes = (1..bins.len()).filter_map(|bin| {
         left.add(&bins[bin - 1]);
-        let cost = left.cost() + right_cost[bin];
-        (left.count > 0 && cost.is_finite()).then_some(Plane { axis, bin, cost })
+        let (cost, right) = (left.cost() + rights[bin].cost(), &rights[bin]);
+        let divides = left.count > 0 && right.count > 0 && cost.is_finite();
+        divides.then_some(Plane { axis, bin, cost, sides: [left.bounds, right.bounds] })
     });
     planes.min_by(|a, b| a.cost.total_cmp(&b.cost))
 }
 
 /// Put the items that `goes_left` first and count them.
-fn partition(items: &mut [Item], goes_left: impl Fn(&Item) -> bool) -> usize {
+pub(super) fn partition(items: &mut [Item], goes_left: impl Fn(&Item) -> bool) -> usize {
     let (mut begin, mut end) = (0, items.len());
     loop {
         while begin < end && goes_left(&items[begin]) {

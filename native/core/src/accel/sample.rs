@@ -211,12 +211,17 @@ impl Samples {
                 (first - rays..first).filter(|&ray| is_hit(ray)).count()
             })
             .collect();
-        Evidence { rays: self.len(), hits: hits.iter().sum(), spread: index_of_dispersion(&self.strata, &hits) }
+        Evidence {
+            rays: self.len(),
+            hits: hits.iter().sum(),
+            spread: index_of_dispersion(&self.strata, &hits),
+            freedom: self.strata.len().saturating_sub(1),
+        }
     }
 }
 
 /// What sample rays tell about a node.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Evidence {
     /// Rays traced.
     pub rays: usize,
@@ -224,9 +229,19 @@ pub struct Evidence {
     pub hits: usize,
     /// How much more the hits vary over the strata than chance alone would make them.
     pub spread: f64,
+    /// Degrees of freedom of the spread: over how many strata it was seen, less one for every set of rays.
+    pub freedom: usize,
 }
 
 impl Evidence {
+    /// Both together.
+    pub fn and(&self, other: &Self) -> Self {
+        let freedom = self.freedom + other.freedom;
+        let sum = self.spread * self.freedom as f64 + other.spread * other.freedom as f64;
+        let spread = sum / freedom.max(1) as f64;
+        Self { rays: self.rays + other.rays, hits: self.hits + other.hits, spread, freedom }
+    }
+
     /// The share of rays that hit.
     pub fn share(&self) -> f64 {
         self.hits as f64 / self.rays.max(1) as f64
@@ -300,7 +315,8 @@ mod tests {
     fn even_hits_have_low_spread_and_one_sided_hits_a_high_one() {
         let samples = Samples::new(&CUBE, 480, 0, 0);
         let rays = samples.rays().unwrap();
-        assert_eq!(samples.evidence(|_| true), Evidence { rays: 480, hits: 480, spread: 0.0 });
+        let freedom = samples.strata.len() - 1;
+        assert_eq!(samples.evidence(|_| true), Evidence { rays: 480, hits: 480, spread: 0.0, freedom });
         assert!(samples.evidence(|i| i % 2 == 0).spread < 0.5);
         let mut coin = Generator::new(5, 5);
         let tosses: Vec<bool> = (0..480).map(|_| coin.uniform() < 0.5).collect();

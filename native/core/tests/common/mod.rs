@@ -246,8 +246,9 @@ pub fn run(name: &str, level: &str, test: impl Fn(&Walk)) {
 macro_rules! every_walk {
     ($tests:tt) => {
         $crate::every_walk!(@variants $tests;
-            bvh_median, bvh_sah, bvh_clusters, lbvh, grid, grid_two_level, grid_irregular, grid_tetrahedral, hapala,
-            tried_hapala, fellner, nested_fellner, hybrid_sampled, hybrid, eager_sampled, few_hybrid,
+            bvh_median, bvh_median_reinsert, bvh_sah, bvh_sah_reinsert, sbvh, sbvh_reinsert, ploc, ploc_reinsert,
+            bvh_clusters, lbvh, grid, grid_two_level, grid_irregular, grid_tetrahedral, hapala, tried_hapala, fellner,
+            nested_fellner, hybrid_sampled, hybrid_sequential, hybrid, eager_sampled, eager_sequential, few_hybrid,
             many_hybrid);
     };
     (@variants $tests:tt; $($variant:ident),+) => {
