@@ -84,7 +84,7 @@ METHODS: tuple[Method, ...] = (
     Method(
         "hybrid",
         "Hybrid",
-        "Lazy cells of a grid, a quick hierarchy, or a good one with grids where they pay: whichever the expected rays favour",
+        "Lazy cells of a grid, a quick hierarchy, or one with grids where they pay, as the expected rays favour",
     ),
 )
 
