@@ -18,7 +18,7 @@ from .desktop import Desktop, wait_until
 
 ROOT = Path(__file__).resolve().parents[2]
 MODULE = "bl_ext.user_default.espalier"
-METHODS = ["bvh-median", "bvh-sah", "bvh-clusters", "lbvh", "grid", "hybrid-sampled", "hybrid"]
+METHODS = ["bvh-median", "bvh-sah", "grid", "hybrid-sampled", "hybrid"]
 ROWS = f"""
 import importlib
 session = importlib.import_module("{MODULE}.session").of(window.scene)

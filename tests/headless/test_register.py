@@ -11,15 +11,7 @@ import espalier
 
 def test_settings_are_on_the_scene(scene):
     assert scene.espalier.method == "hybrid"
-    assert scene.espalier.methods == {
-        "bvh-median",
-        "bvh-sah",
-        "bvh-clusters",
-        "lbvh",
-        "grid",
-        "hybrid-sampled",
-        "hybrid",
-    }
+    assert scene.espalier.methods == {"bvh-median", "bvh-sah", "grid", "hybrid-sampled", "hybrid"}
 
 
 def test_every_setting_has_a_tooltip(scene):

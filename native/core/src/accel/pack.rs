@@ -40,7 +40,9 @@ pub fn pack_opened(tree: &Tree, mesh: &Mesh, opening: Opening, job: &Job) -> Res
     let leaves = tree.nodes.iter().filter(|node| node.kind == Kind::Leaf).count();
     let (blocks, nodes) = (Arena::with_capacity(leaves, "the leaves")?, Arena::with_capacity(leaves, "the nodes")?);
     let collapse = (opening == Opening::Cheapest).then(|| Collapse::new(tree)).transpose()?;
-    let surplus = tree.items.len().saturating_sub(mesh.solid().len()) as u64;
+    // What is in the cells of nests is not counted, however often it is there.
+    let items = if tree.nests.is_empty() { tree.items.len() } else { 0 };
+    let surplus = items.saturating_sub(mesh.solid().len()) as u64;
     let (lattices, nested, centre) = (Lattices::default(), 0, domain.centre);
     let mut packer = Packer { tree, mesh, job, centre, surplus, collapse, nodes, blocks, lattices, nested };
     let packed = if tree.nodes.is_empty() { Packed::EMPTY } else { packer.subtree(0)? };
