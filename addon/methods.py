@@ -54,7 +54,7 @@ METHODS: tuple[Method, ...] = (
     Method(
         "bvh-clusters",
         "BVH (Clusters)",
-        "The same heuristic over pairs of neighbouring triangles: half the build time, as good to trace",
+        "The same heuristic over clusters of up to four triangles: about half the build time, nearly as good to trace",
     ),
     Method("lbvh", "Linear BVH", "Bounding volume hierarchy along a space-filling curve: the fastest to build"),
     Method("grid", "Uniform Grid", "One uniform grid of cells over the whole scene"),

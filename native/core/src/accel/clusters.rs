@@ -1,6 +1,12 @@
 //! Clusters of few triangles, which stay together in a tree: half as many things to decide about. Along a Morton curve
 //! neighbours that are each other's nearest are merged, after Meister and Bittner, "Parallel Locally-Ordered Clustering
 //! for Bounding Volume Hierarchy Construction", TVCG 24(3), 2018; as its distance, the area of the box around both.
+//!
+//! Measured against the surface area heuristic over single triangles, by steps of a ray: from the camera 1.6 to 4.1% more
+//! (bunny, horse, dragon, city, hair, soup), after a bounce 0 to 2.7% more, and fewer tests. Sponza differs: 13% and 40%
+//! more, 19% fewer along random lines, though the expected cost of its tree is 4% lower. Fetching the corners, which
+//! miss the cache, is two thirds of the time of clustering; fetching them in a loop of their own did not help, nor did
+//! comparing with 8 neighbours to either side instead of 15.
 
 use rayon::prelude::*;
 
