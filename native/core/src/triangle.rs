@@ -47,7 +47,7 @@ impl Block {
 
     /// The corners in a lane.
     #[inline(always)]
-    fn corners(&self, lane: usize) -> [[f32; 3]; 3] {
+    pub(crate) fn corners(&self, lane: usize) -> [[f32; 3]; 3] {
         self.corner.map(|corner| corner.map(|axis| axis[lane]))
     }
 

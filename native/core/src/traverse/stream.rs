@@ -162,7 +162,7 @@ pub fn trace<S: Simd, const GRIDS: bool, const ANY: bool>(
 
 /// Ask for what will be visited soon, so that it is near by then.
 #[inline(always)]
-fn warm<S: Simd>(simd: S, here: View<'_>, node: NodeRef) {
+pub fn warm<S: Simd>(simd: S, here: View<'_>, node: NodeRef) {
     match node.target() {
         Target::Branch(index) => simd.prefetch(&here.nodes[index as usize]),
         Target::Leaf { block, .. } => simd.prefetch(&here.blocks[block as usize]),

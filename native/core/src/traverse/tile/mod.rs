@@ -39,7 +39,7 @@ use self::{
     frustum::{Boxes, Projector},
     leaf::Planes,
 };
-use super::kernel::Entry;
+use super::{kernel::Entry, stream};
 use crate::{
     Mesh,
     accel::structure::{NodeRef, Structure, Target},
@@ -124,7 +124,12 @@ pub fn trace<S: Simd, const GRIDS: bool>(
             Target::Branch(index) => {
                 let node = &here.nodes[index as usize];
                 let boxes = projector.boxes(simd, tile, node);
+                let pushed = visits.len();
                 push(tile, &boxes, &node.child, node.order[tile.octant], groups, visits);
+                // Most children are visited; those that are not cost less than waiting for those that are.
+                for visit in &visits[pushed..] {
+                    stream::warm(simd, here, visit.node);
+                }
             }
             Target::Leaf { block, count } => {
                 let block = &here.blocks[block as usize];

@@ -75,7 +75,7 @@ pub struct Tile {
     /// Whether rays rise (1) or fall (-1) along z.
     pub sign: f32,
     /// The common origin.
-    pub origin: Vec3,
+    pub origin: [f32; 3],
     /// The origin relative to the centre of the domain.
     pub local: Vec3,
     /// Largest component of that.
@@ -108,7 +108,7 @@ impl Default for Tile {
             count: 0,
             axes: [0, 1, 2],
             sign: 1.0,
-            origin: Vec3::ZERO,
+            origin: [0.0; 3],
             local: Vec3::ZERO,
             reach: 0.0,
             half_extent: 0.0,
@@ -162,7 +162,7 @@ impl Tile {
         self.axes = [(z + 1) % 3, (z + 2) % 3, z];
         self.sign = 1f32.copysign(ray.direction[z]);
         self.octant = (0..3).fold(0, |octant, k| octant | usize::from(ray.direction[k] < 0.0) << k);
-        self.origin = ray.origin;
+        self.origin = ray.origin.to_array();
         self.local = ray.origin - domain.centre;
         self.reach = self.local.abs().max_element();
         self.half_extent = domain.half_extent;
@@ -298,7 +298,7 @@ impl Tile {
         let Exactly { direction, interval: [tmin, tmax], scale } = &self.exactly[group];
         let direction = Vec3::from_array(direction.map(|axis| axis[lane]));
         let interval = (tmin[lane], tmax[lane]);
-        let frame = Frame::near(self.origin, self.local, self.reach, direction, interval, &self.domain);
+        let frame = Frame::near(Vec3::from(self.origin), self.local, self.reach, direction, interval, &self.domain);
         Frame { scale: scale[lane], ..frame }
     }
 }

@@ -35,14 +35,7 @@ impl Tile {
         if self.slanted >> group & 1 == 1 {
             return self.decide_one_by_one(mesh, group, lanes, block, triangle);
         }
-        let mut corners = [[simd.splat(0.0); 3]; 3];
-        for c in 0..3 {
-            for k in 0..3 {
-                let axis = self.axes[k];
-                corners[c][k] = simd.sub(simd.splat(block.corner[c][axis][triangle]), simd.splat(self.origin[axis]));
-            }
-        }
-        let exact = self.exact(simd, group, &corners);
+        let exact = self.exact(simd, group, &self.repeated(simd, block.corners(triangle)));
         let t = simd.store(exact.t);
         let [tmin, tmax] = self.exactly[group].interval;
         let (hit, unclear) = (lanes & exact.hit, lanes & exact.unclear);
@@ -179,28 +172,58 @@ impl Tile {
 
     #[inline(always)]
     fn set_together<S: Simd>(&self, simd: S, mesh: &Mesh, group: usize, met: u32, hits: &mut Eight) {
-        let mut corners = [[[0.0; LANES]; 3]; 3];
-        for lane in (0..LANES).filter(|lane| met >> lane & 1 == 1) {
-            hits.primitive[lane] = self.groups[group].best[lane].to_bits();
-            for (c, corner) in mesh.corners(hits.primitive[lane]).iter().enumerate() {
-                for k in 0..3 {
-                    corners[c][k][lane] = corner[k];
-                }
+        hits.primitive = self.groups[group].best.map(f32::to_bits);
+        let any = hits.primitive[met.trailing_zeros() as usize % LANES];
+        let mut differ = false;
+        for lane in 0..LANES {
+            if hits.primitive[lane] == MISS {
+                hits.primitive[lane] = any;
             }
+            differ |= hits.primitive[lane] != any;
         }
-        let [mut a, mut b, mut c] = [[simd.splat(0.0); 3]; 3];
-        for k in 0..3 {
-            let origin = simd.splat(self.origin[self.axes[k]]);
-            a[k] = simd.sub(simd.load(&corners[0][self.axes[k]]), origin);
-            b[k] = simd.sub(simd.load(&corners[1][self.axes[k]]), origin);
-            c[k] = simd.sub(simd.load(&corners[2][self.axes[k]]), origin);
-        }
-        let exact = self.exact(simd, group, &[a, b, c]);
+        let corners =
+            if differ { self.gathered(simd, mesh, &hits.primitive) } else { self.repeated(simd, corners(mesh, any)) };
+        let exact = self.exact(simd, group, &corners);
         hits.t = simd.store(simd.mul(exact.t, simd.load(&self.exactly[group].scale)));
         hits.u = simd.store(exact.u);
         hits.v = simd.store(exact.v);
         for lane in (0..LANES).filter(|lane| met >> lane & 1 == 0) {
             hits.set(lane, Hit::MISS);
         }
+    }
+
+    /// Corners of eight triangles relative to the origin, in the order of the tile's axes.
+    #[inline(always)]
+    fn gathered<S: Simd>(&self, simd: S, mesh: &Mesh, triangles: &[u32; LANES]) -> [[S::F32; 3]; 3] {
+        let mut columns = [[[0.0; LANES]; 3]; 3];
+        for (lane, &triangle) in triangles.iter().enumerate() {
+            let [a, b, c] = corners(mesh, triangle);
+            for k in 0..3 {
+                columns[0][k][lane] = a[k];
+                columns[1][k][lane] = b[k];
+                columns[2][k][lane] = c[k];
+            }
+        }
+        let mut relative = [[simd.splat(0.0); 3]; 3];
+        for c in 0..3 {
+            for k in 0..3 {
+                let axis = self.axes[k];
+                relative[c][k] = simd.sub(simd.load(&columns[c][axis]), simd.splat(self.origin[axis]));
+            }
+        }
+        relative
+    }
+
+    /// Corners of one triangle relative to the origin, in the order of the tile's axes, in every lane.
+    #[inline(always)]
+    fn repeated<S: Simd>(&self, simd: S, corners: [[f32; 3]; 3]) -> [[S::F32; 3]; 3] {
+        let mut relative = [[simd.splat(0.0); 3]; 3];
+        for c in 0..3 {
+            for k in 0..3 {
+                let axis = self.axes[k];
+                relative[c][k] = simd.splat(corners[c][axis] - self.origin[axis]);
+            }
+        }
+        relative
     }
 }
