@@ -62,13 +62,13 @@ def test_boxes_can_be_fewer() -> None:
 def test_methods_that_decide_keep_their_evidence(method: str) -> None:
     decisions = BUILT[method].decisions()
     lengths = {len(column) for column in decisions.values()}
-    decides = method in {"hybrid-sampled", "hapala", "fellner"}
+    decides = method in {"hybrid-sampled", "hybrid-sequential", "hapala", "fellner"}
     assert max(lengths) == min(lengths) if decides else lengths == {0}
     assert decisions["lower"].shape[1:] == decisions["upper"].shape[1:] == (3,)
     assert decisions["verdict"].dtype == np.uint8
     assert np.isin(decisions["verdict"], [0, 1, 2]).all()
     assert (decisions["hits"] <= decisions["rays"]).all()
     assert np.count_nonzero(decisions["verdict"] == 1) == (BUILT[method].census()["grids"] if lengths != {0} else 0)
-    if method == "hybrid-sampled":
+    if method in {"hybrid-sampled", "hybrid-sequential"}:
         assert (decisions["depth"][0], decisions["primitives"][0]) == (0, 20_000)
         np.testing.assert_allclose([decisions["lower"][0], decisions["upper"][0]], MESH.bounds, atol=1e-6)
