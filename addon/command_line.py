@@ -8,7 +8,6 @@ import argparse
 import contextlib
 import os
 import shutil
-import signal
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -20,7 +19,7 @@ from .images import write_png
 from .methods import COMPARED_METHODS, METHOD_NAMES
 from .outputs import OutputFolder
 from .study import command as study_command
-from .terminal import ProgressLine, own_streams
+from .terminal import ProgressLine, heeding_ctrl_c, own_streams
 
 USAGE_STATUS, INTERRUPTED_STATUS = 2, 130
 
@@ -150,17 +149,15 @@ def _blender() -> Iterator[None]:
     from . import register as register_addon
     from . import unregister as unregister_addon
 
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
     registered_here = not hasattr(bpy.types.Scene, "espalier")
     if registered_here:
         register_addon()
     try:
-        yield
+        with heeding_ctrl_c():
+            yield
     finally:
         if registered_here:
             unregister_addon()
-        if before is not None:  # None: Blender's own handler, in C, which Python cannot put back; Blender ends now
-            signal.signal(signal.SIGINT, before)
 
 
 def _expected_errors() -> tuple[type[Exception], ...]:

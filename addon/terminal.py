@@ -6,6 +6,7 @@ One way of drawing serves the shell and Blender's own Python, which has no packa
 import contextlib
 import ctypes
 import os
+import signal
 import sys
 import tempfile
 import time
@@ -87,3 +88,14 @@ def _flush() -> None:
     sys.stderr.flush()
     c = ctypes.CDLL("ucrtbase" if os.name == "nt" else None)
     c.fflush(None)
+
+
+@contextlib.contextmanager
+def heeding_ctrl_c() -> Iterator[None]:
+    """Ctrl C as Python knows it, also within Blender and in a process that was started to ignore it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        if before is not None:  # None: Blender's own handler, in C, which Python cannot put back; Blender ends now
+            signal.signal(signal.SIGINT, before)

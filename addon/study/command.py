@@ -10,7 +10,7 @@ from typing import Any, TextIO
 from .. import catalogue, input_kinds, machine, native
 from ..arguments import count, listed, resolution, some_of
 from ..report import aligned
-from ..terminal import ProgressLine, own_streams
+from ..terminal import ProgressLine, heeding_ctrl_c, own_streams
 from . import check, embree, paper, sources, writing
 from .fingerprint import fingerprint
 from .journal import REPORT, Journal, forget
@@ -124,9 +124,10 @@ def _measure(
     journal = Journal(options.out, plan, fingerprint())
     study = Study(plan, journal, load, lambda done: writing.publish(options.out, done, table), _sizes())
     try:
-        study.start()
-        while not study.wait(POLL_SECONDS):
-            line.update(study.progress, study.scene, study.detail)
+        with heeding_ctrl_c():
+            study.start()
+            while not study.wait(POLL_SECONDS):
+                line.update(study.progress, study.scene, study.detail)
     except KeyboardInterrupt:
         line.close()
         stderr.write(f"espalier: the study goes on from here with the same command and the same --out {options.out}\n")
