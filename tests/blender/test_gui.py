@@ -84,8 +84,8 @@ def changed(before: NDArray[np.uint8], after: NDArray[np.uint8], area: tuple[int
 
 
 def show_cells(desktop: Desktop, shown: bool) -> None:
-    """Switch the overlay."""
-    desktop.python(f"window.scene.espalier.overlay.show = {shown}")
+    """Switch the overlay, of the method that has cells of grids in this scene."""
+    desktop.python(f"overlay = window.scene.espalier.overlay\noverlay.method, overlay.show = 'hybrid-sampled', {shown}")
 
 
 def test_build_and_trace_fills_the_table(desktop: Desktop) -> None:
