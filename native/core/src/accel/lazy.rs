@@ -102,7 +102,7 @@ impl LazyCells {
     fn refine_now(&self, index: usize, mesh: &Mesh) -> Option<&Refined> {
         thread_local!(static BUILDER: RefCell<SmallBuilder> = RefCell::default());
         let build = || {
-            let built = BUILDER.with_borrow_mut(|builder| builder.build_in_order(mesh, self.triangles(index)));
+            let built = BUILDER.with_borrow_mut(|builder| builder.build(mesh, self.triangles(index)));
             let Subtree { root, nodes, blocks, .. } = built.ok()?;
             Some(Refined { root, nodes: nodes.into(), blocks: blocks.into() })
         };
