@@ -18,6 +18,7 @@ import bpy
 import numpy as np
 
 from . import images, machine, native
+from .background import Background
 from .capture import export_frame
 from .cycles import Job, SecondBlender, command
 from .difference import flip, rmse
@@ -56,15 +57,15 @@ class Outcome:
     notes: tuple[str, ...]
 
 
-class Comparison:
+class Comparison(Background):
     """A comparison under way, with the members that a task of the interface has. It owns its temporary folder."""
 
     def __init__(
         self, data: SceneData, job: Job, settings: Settings, folder: "tempfile.TemporaryDirectory[str]"
     ) -> None:
         """Raises as Run does. `job.threads` is what `settings.options.threads` came to."""
+        super().__init__("espalier-compare")
         self.run = Run(data, settings.methods, replace(settings.options, threads=job.threads))
-        self.error: BaseException | None = None
         self.outcome: Outcome | None = None
         self._data = data
         self._job = job
@@ -73,27 +74,11 @@ class Comparison:
         self._second: SecondBlender | None = None
         self._difference = 0.0
         self._cancel = threading.Event()
-        self._thread = threading.Thread(target=self._work, name="espalier-compare", daemon=True)
-
-    def start(self) -> "Comparison":
-        """Start the thread and return at once."""
-        self._thread.start()
-        return self
 
     def cancel(self) -> None:
         """Ask the thread to stop; it does within 0.2 s, and kills the second Blender."""
         self._cancel.set()
         self.run.cancel()
-
-    def wait(self, timeout: float | None = None) -> bool:
-        """Wait until the thread has ended, at most `timeout` seconds. True when it has."""
-        self._thread.join(timeout)
-        return self.done
-
-    @property
-    def done(self) -> bool:
-        """True when the thread was started and has ended, for whatever reason."""
-        return self._thread.ident is not None and not self._thread.is_alive()
 
     @property
     def cancelled(self) -> bool:
@@ -119,16 +104,9 @@ class Comparison:
         second = "start" if self._second is None else self._second.status
         return f"{'Cycles' if self._with_cycles else 'Pictures'}: {second}"
 
-    def raise_error(self) -> None:
-        """Raise what ended the thread early, if anything but a cancel did."""
-        if self.error is not None and not self.cancelled:
-            raise self.error
-
     def _work(self) -> None:
         try:
             self.outcome = self._compare()
-        except BaseException as error:  # noqa: BLE001 - handed to the thread that waits, see raise_error
-            self.error = error
         finally:
             self._folder.cleanup()
 

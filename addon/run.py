@@ -3,12 +3,12 @@
 The thread never touches Blender's data: everything it needs is in SceneData, which the main thread exported.
 """
 
-import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from . import calibration, methods, native
+from .background import Background
 from .errors import EspalierAddonError
 from .scene_data import SceneData
 
@@ -72,40 +72,24 @@ class MethodResult:
         return self.rays / self.trace_s / 1e6 if self.trace_s > 0.0 else 0.0
 
 
-class Run:
+class Run(Background):
     """Builds and traces `data` with each method in turn; start it, watch it, cancel it, from any other thread."""
 
     def __init__(self, data: SceneData, method_names: Sequence[str], options: Options) -> None:
         """Raises NativeModuleMissingError. `method_names` are native names and must not be empty."""
         if not method_names:
             raise EspalierAddonError("No method is chosen: enable at least one method")
+        super().__init__("espalier-run")
         self.data = data
         self.method_names = tuple(method_names)
         self.options = options
-        self.error: BaseException | None = None
         self._native = native.module()
         self._job = self._native.Job()
         self._results: list[MethodResult] = []
-        self._thread = threading.Thread(target=self._work, name="espalier-run", daemon=True)
-
-    def start(self) -> "Run":
-        """Start the thread and return at once."""
-        self._thread.start()
-        return self
 
     def cancel(self) -> None:
         """Ask the thread to stop; it does within 0.2 s. What is finished by then stays in `results`."""
         self._job.cancel()
-
-    def wait(self, timeout: float | None = None) -> bool:
-        """Wait until the thread has ended, at most `timeout` seconds. True when it has."""
-        self._thread.join(timeout)
-        return self.done
-
-    @property
-    def done(self) -> bool:
-        """True when the thread was started and has ended, for whatever reason."""
-        return self._thread.ident is not None and not self._thread.is_alive()
 
     @property
     def cancelled(self) -> bool:
@@ -135,18 +119,10 @@ class Run:
             return ""
         return f"{methods.label(self.method_names[finished])}: {self._job.phase or 'prepare'}"
 
-    def raise_error(self) -> None:
-        """Raise what ended the thread early, if anything but a cancel did."""
-        if self.error is not None and not self.cancelled:
-            raise self.error
-
     def _work(self) -> None:
-        try:
-            handles = native.handles(self.data)
-            for name in self.method_names:
-                self._results.append(self._build_and_trace(name, handles))
-        except BaseException as error:  # noqa: BLE001 - handed to the thread that waits, see raise_error
-            self.error = error
+        handles = native.handles(self.data)
+        for name in self.method_names:
+            self._results.append(self._build_and_trace(name, handles))
 
     def _build_and_trace(self, name: str, handles: native.Handles) -> MethodResult:
         options = self.options

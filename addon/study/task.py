@@ -8,9 +8,10 @@ import math
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any
+from typing import Any, Self
 
 from .. import catalogue, methods, native
+from ..background import Background
 from ..errors import CancelledError
 from . import measure, rays
 from .embree import version as embree_version
@@ -31,7 +32,7 @@ LEAST_RUNS = 3
 """A case of which one run is within the plan's seconds is measured as often as this, so that it has an interval."""
 
 
-class Study:
+class Study(Background):
     """Start it, watch it, cancel it from any other thread. Results are in `journal` as they come."""
 
     def __init__(
@@ -44,8 +45,8 @@ class Study:
     ) -> None:
         """finish: called by the thread when all is measured. sizes: triangles of scenes, where known, to estimate the
         time left. Raises NativeModuleMissingError."""
+        super().__init__("espalier-study")
         self.plan, self.journal = plan, journal
-        self.error: BaseException | None = None
         self.results: Results | None = None
         self._native = native.module()
         self._load, self._finish = load, finish
@@ -58,28 +59,16 @@ class Study:
         self._share: dict[Case, float] = {case: self._kept_share(case) for case in self._weights}
         self._resumed = self._done_weight()
         self._opened: tuple[tuple[str, float], Source, Any] | None = None
-        self._thread = threading.Thread(target=self._work, name="espalier-study", daemon=True)
 
-    def start(self) -> "Study":
+    def start(self) -> Self:
         """Start the thread and return at once."""
         self._began = time.monotonic()
-        self._thread.start()
-        return self
+        return super().start()
 
     def cancel(self) -> None:
         """Ask the thread to stop; it does within 0.2 s, or at the end of what Embree builds."""
         self._cancel.set()
         self._job.cancel()
-
-    def wait(self, timeout: float | None = None) -> bool:
-        """Wait until the thread has ended, at most `timeout` seconds. True when it has."""
-        self._thread.join(timeout)
-        return self.done
-
-    @property
-    def done(self) -> bool:
-        """True when the thread was started and has ended, for whatever reason."""
-        return self._thread.ident is not None and not self._thread.is_alive()
 
     @property
     def cancelled(self) -> bool:
@@ -116,19 +105,16 @@ class Study:
         """Scene and detail in one line; empty when done."""
         return f"{self.scene}: {self.detail}" if self.scene else ""
 
-    def raise_error(self) -> None:
-        """Raise what ended the thread early, if anything but a cancel did."""
-        if self.error is not None and not self.cancelled:
-            raise self.error
-
     def _work(self) -> None:
         try:
             for group in self.plan.groups():
                 self._measure_group(group)
             self._doing = "report"
             self.results = self._finish(self.journal)
-        except BaseException as error:  # noqa: BLE001 - handed to the thread that waits, see raise_error
-            self.error = CancelledError() if self._cancel.is_set() else error
+        except BaseException as error:
+            if self._cancel.is_set():
+                raise CancelledError from error
+            raise
         finally:
             self._opened = None
             self.journal.close()
