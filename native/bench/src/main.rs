@@ -3,13 +3,14 @@
 //!
 //! `espalier-bench race PLAN.json` measures; `espalier-bench hits PLAN.json` only counts the hits of the plan's
 //! rays, without Embree; `espalier-bench rays PLAN.json CLASS FILE` writes them; `espalier-bench steps PLAN.json
-//! METHODS` counts what rays do in trees; `espalier-bench work PLAN.json CLASS METHOD REPEATS` does what a class times, without
+//! METHODS` counts what rays do in trees; `espalier-bench phases PLAN CLASS METHOD REPEATS` takes a picture's time apart; `espalier-bench work PLAN.json CLASS METHOD REPEATS` does what a class times, without
 //! Embree: the difference between two numbers of repeats is what instruments can count.
 
 mod arena;
 mod camera;
 mod embree;
 mod error;
+mod phases;
 mod plan;
 mod race;
 mod rays;
@@ -36,9 +37,12 @@ fn main() -> ExitCode {
         ["work", plan, class, method, repeats] => {
             Plan::read(Path::new(plan)).and_then(|plan| work(&plan, class, method, repeats))
         }
+        ["phases", plan, class, method, repeats] => {
+            Plan::read(Path::new(plan)).and_then(|plan| phases(&plan, class, method, repeats))
+        }
         ["steps", plan, methods] => Plan::read(Path::new(plan)).and_then(|plan| steps(&plan, methods)),
         _ => Err(Error::Plan(
-            "the arguments are: race PLAN, hits PLAN, rays PLAN CLASS FILE, steps PLAN METHODS, or work PLAN CLASS METHOD REPEATS".into(),
+            "the arguments are: race PLAN, hits PLAN, rays PLAN CLASS FILE, steps PLAN METHODS, phases PLAN CLASS METHOD REPEATS, or work PLAN CLASS METHOD REPEATS".into(),
         )),
     };
     match result {
@@ -116,6 +120,18 @@ fn steps(plan: &Plan, methods: &str) -> Result<(), Error> {
     Ok(())
 }
 
+/// Milliseconds of a picture's parts.
+fn phases(plan: &Plan, class: &str, method: &str, repeats: &str) -> Result<(), Error> {
+    let (class, repeats) = (self::class(plan, class)?, number(repeats)?);
+    let scene = scene::Scene::read(plan)?;
+    println!("{}", phases::row(&scene, class, Method::from_name(method)?, repeats)?);
+    Ok(())
+}
+
+fn number(repeats: &str) -> Result<usize, Error> {
+    repeats.parse().map_err(|_| Error::Plan(format!("'{repeats}' is no number of repeats")))
+}
+
 fn class<'p>(plan: &'p Plan, name: &str) -> Result<&'p Class, Error> {
     let missing = || Error::Plan(format!("the plan has no class {name}"));
     plan.classes.iter().find(|known| known.name == name).ok_or_else(missing)
@@ -123,8 +139,7 @@ fn class<'p>(plan: &'p Plan, name: &str) -> Result<&'p Class, Error> {
 
 /// Do what a class times, `repeats` times.
 fn work(plan: &Plan, class: &str, method: &str, repeats: &str) -> Result<(), Error> {
-    let repeats: usize = repeats.parse().map_err(|_| Error::Plan(format!("'{repeats}' is no number of repeats")))?;
-    let class = self::class(plan, class)?;
+    let (class, repeats) = (self::class(plan, class)?, number(repeats)?);
     let (scene, method) = (scene::Scene::read(plan)?, Method::from_name(method)?);
     let built = scene::Built::new(&scene);
     let rays = scene.rays(class.rays, &built)?;

@@ -92,8 +92,13 @@ impl<'a> Scene<'a> {
 /// # Errors
 /// [`Error::Core`].
 pub fn new_mesh(arrays: &Arrays) -> Result<Arc<Mesh>, Error> {
-    let vertices = arrays.vertices().iter().map(|&vertex| Vec3::from_array(vertex)).collect();
-    Ok(Arc::new(Mesh::new(vertices, arrays.triangles().to_vec())?))
+    let mesh = Mesh::written(arrays.vertices().len(), arrays.triangles().len(), |vertices, triangles| {
+        let pairs = vertices.iter_mut().zip(arrays.vertices());
+        pairs.for_each(|(to, &from)| *to = Vec3::from_array(from));
+        triangles.copy_from_slice(arrays.triangles());
+        Ok::<(), espalier_core::Error>(())
+    });
+    Ok(Arc::new(mesh?))
 }
 
 /// Our accelerators over a scene, each built once.

@@ -84,7 +84,12 @@ impl BoundsA {
     /// The smallest box around a triangle.
     #[inline(always)]
     pub fn of_corners(corners: [Vec3; 3]) -> Self {
-        let [a, b, c] = corners.map(Vec3A::from);
+        Self::of_aligned_corners(corners.map(Vec3A::from))
+    }
+
+    /// The smallest box around a triangle.
+    #[inline(always)]
+    pub fn of_aligned_corners([a, b, c]: [Vec3A; 3]) -> Self {
         Self { lower: a.min(b).min(c), upper: a.max(b).max(c) }
     }
 

@@ -9,6 +9,7 @@ pub mod bounds;
 pub mod error;
 pub mod job;
 pub mod mesh;
+mod pages;
 pub mod pool;
 pub mod ray;
 pub mod render;

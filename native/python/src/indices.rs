@@ -102,30 +102,50 @@ impl<const N: usize> View<'_, N> {
     /// # Errors
     /// The argument's for an index below zero or beyond 32 bits; [`Error::OutOfMemory`].
     pub fn rows(&self) -> Result<Vec<[u32; N]>, Error> {
+        let mut rows = arrays::reserve(self.len(), self.argument.name)?;
+        rows.resize(self.len(), [0; N]);
+        self.write(&mut rows)?;
+        Ok(rows)
+    }
+
+    /// How many rows there are.
+    pub fn len(&self) -> usize {
+        let integers = match self.integers {
+            Slice::Unsigned(values) => values.len(),
+            Slice::Signed(values) => values.len(),
+            Slice::Long(values) => values.len(),
+            Slice::UnsignedLong(values) => values.len(),
+        };
+        integers / N
+    }
+
+    /// Write all rows to as many.
+    ///
+    /// # Errors
+    /// The argument's for an index below zero or beyond 32 bits.
+    pub fn write(&self, rows: &mut [[u32; N]]) -> Result<(), Error> {
         match self.integers {
-            Slice::Unsigned(values) => rows(values, self.argument),
-            Slice::Signed(values) => rows(values, self.argument),
-            Slice::Long(values) => rows(values, self.argument),
-            Slice::UnsignedLong(values) => rows(values, self.argument),
+            Slice::Unsigned(values) => write(values, self.argument, rows),
+            Slice::Signed(values) => write(values, self.argument, rows),
+            Slice::Long(values) => write(values, self.argument, rows),
+            Slice::UnsignedLong(values) => write(values, self.argument, rows),
         }
     }
 }
 
-fn rows<T: Copy + TryInto<u32> + Debug, const N: usize>(
+fn write<T: Copy + TryInto<u32> + Debug, const N: usize>(
     values: &[T],
     argument: Argument<'static>,
-) -> Result<Vec<[u32; N]>, Error> {
+    rows: &mut [[u32; N]],
+) -> Result<(), Error> {
     let (given, _) = values.as_chunks::<N>();
-    let mut rows = arrays::reserve(given.len(), argument.name)?;
-    for (index, row) in given.iter().enumerate() {
-        let mut indices = [0; N];
+    for (index, (row, indices)) in given.iter().zip(rows).enumerate() {
         for (slot, value) in indices.iter_mut().zip(row) {
             *slot = (*value).try_into().map_err(|_| {
                 let message = format!("{}[{index}] is {row:?}; indices must be from 0 to {}", argument.name, u32::MAX);
                 argument.error.core(message)
             })?;
         }
-        rows.push(indices);
     }
-    Ok(rows)
+    Ok(())
 }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use espalier_core::{Column, Error};
+use espalier_core::Column;
 use glam::Vec3;
 use pyo3::prelude::*;
 
@@ -41,7 +41,12 @@ impl Mesh {
             let vertices = Rows::table(vertices, 3, Argument { name: "vertices", error: Kind::Mesh })?;
             let triangles = Indices::<3>::new(triangles, Argument { name: "triangles", error: Kind::Mesh })?;
             let (columns, count, view) = (vertices.columns(), vertices.len(), triangles.view());
-            let mesh = py.detach(|| espalier_core::Mesh::new(points(columns, count)?, view.rows()?));
+            let mesh = py.detach(|| {
+                espalier_core::Mesh::written(count, view.len(), |vertices, triangles| {
+                    write(columns, vertices);
+                    view.write(triangles)
+                })
+            });
             Ok(Self(Arc::new(mesh.or_raise(py)?)))
         })
     }
@@ -80,8 +85,8 @@ impl Mesh {
 }
 
 /// Points from their coordinates.
-fn points(columns: [Column<'_>; 3], count: usize) -> Result<Vec<Vec3>, Error> {
-    let mut points = arrays::reserve(count, "the list of vertices")?;
-    points.extend((0..count).map(|index| Vec3::from_array(columns.map(|column| column.get(index)))));
-    Ok(points)
+fn write(columns: [Column<'_>; 3], points: &mut [Vec3]) {
+    for (index, point) in points.iter_mut().enumerate() {
+        *point = Vec3::from_array(columns.map(|column| column.get(index)));
+    }
 }

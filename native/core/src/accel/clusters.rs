@@ -11,11 +11,15 @@
 use rayon::prelude::*;
 
 use super::{
+    ahead,
     morton::Key,
     nearest::{self, Neighbours},
     record::{Record, UnitCube},
 };
-use crate::{Error, Job, Mesh, error, simd::Level};
+use crate::{
+    Error, Job, Mesh, error,
+    simd::{Kernel, Level, Simd},
+};
 
 /// Triangles are clustered in chunks of this size, so that all that is looked at fits the nearest cache.
 const CHUNK: usize = nearest::MOST;
@@ -111,12 +115,9 @@ impl Clusterer<'_> {
     /// Cluster a chunk whose first triangle has the place `first` among all.
     fn chunk(&self, first: usize, keys: &[Key], room: &mut Room, triangles: &mut [u32]) -> Chunk {
         let Room { neighbours, order, records } = room;
-        records.clear();
         order.clear();
-        for (index, key) in keys.iter().enumerate() {
-            records.push(Record::new(&self.cube.bounds(self.mesh.corners(key.triangle())), index, 1));
-            order.push(key.triangle());
-        }
+        order.extend(keys.iter().map(|key| key.triangle()));
+        self.level.run(Fetch { mesh: self.mesh, cube: &self.cube, triangles: order, records });
         for (most, growth) in ROUNDS {
             neighbours.find(records, self.level);
             records.clear();
@@ -126,6 +127,29 @@ impl Clusterer<'_> {
         let clusters: Vec<Record> = records.iter().map(|record| record.at(first + record.range().start)).collect();
         let cells = cells(first, &clusters);
         Chunk { clusters, cells }
+    }
+}
+
+/// Makes a record of each triangle.
+struct Fetch<'a> {
+    mesh: &'a Mesh,
+    cube: &'a UnitCube,
+    triangles: &'a [u32],
+    records: &'a mut Vec<Record>,
+}
+
+impl Kernel for Fetch<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) {
+        let Self { mesh, cube, triangles, records } = self;
+        let reader = mesh.reader();
+        records.clear();
+        for (index, &triangle) in triangles.iter().enumerate() {
+            ahead::ask(simd, reader, index, |place| triangles.get(place).copied());
+            records.push(Record::new(&cube.bounds(reader.corners(triangle)), index, 1));
+        }
     }
 }
 

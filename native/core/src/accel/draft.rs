@@ -1,13 +1,18 @@
 //! Subtrees as planners leave them: which triangles share a leaf, which children share a node. The geometry is then
 //! fitted from the leaves up, and written once, to where rays will read it.
 
-use glam::Vec3A;
+use glam::{Mat4, Vec3A, Vec4};
 
-use super::structure::{Node, NodeRef, Target};
+use super::{
+    ahead,
+    structure::{Node, NodeRef, Target},
+};
 use crate::{
     Mesh,
     bounds::BoundsA,
+    mesh::Reader,
     ray::MISS,
+    simd::{Kernel, Level, Simd},
     triangle::{Block, LANES},
 };
 
@@ -63,7 +68,7 @@ impl Default for Draft {
 pub struct Site<'a> {
     /// As many nodes as the draft has.
     pub nodes: &'a mut [Node],
-    /// As many blocks as the draft has leaves, all of their bytes zero.
+    /// As many blocks as the draft has leaves.
     pub blocks: &'a mut [Block],
     /// The number of the first node.
     pub first_node: usize,
@@ -91,9 +96,8 @@ impl Boxes {
 
 /// Write a draft: blocks of triangles, then nodes around them from the last to the first. Returns the box of the root,
 /// in the mesh's own coordinates.
-pub fn fit(draft: &Draft, mesh: &Mesh, centre: Vec3A, site: &mut Site<'_>, boxes: &mut Boxes) -> BoundsA {
-    boxes.leaves.clear();
-    boxes.leaves.extend(draft.leaves.iter().zip(&mut *site.blocks).map(|(leaf, block)| fill(leaf, mesh, block)));
+pub fn fit(draft: &Draft, mesh: &Mesh, centre: Vec3A, site: &mut Site<'_>, boxes: &mut Boxes, level: Level) -> BoundsA {
+    level.run(Leaves { leaves: &draft.leaves, mesh, blocks: site.blocks, boxes: &mut boxes.leaves });
     boxes.nodes.clear();
     boxes.nodes.resize(draft.nodes.len(), BoundsA::EMPTY);
     for (index, children) in draft.nodes.iter().enumerate().rev() {
@@ -105,14 +109,49 @@ pub fn fit(draft: &Draft, mesh: &Mesh, centre: Vec3A, site: &mut Site<'_>, boxes
     boxes.of(draft.root)
 }
 
-/// Put triangles into a block of zeros; returns the box around them.
+/// Writes blocks and finds the boxes around them.
+struct Leaves<'a> {
+    leaves: &'a [[u32; LANES]],
+    mesh: &'a Mesh,
+    blocks: &'a mut [Block],
+    boxes: &'a mut Vec<BoundsA>,
+}
+
+impl Kernel for Leaves<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) {
+        let Self { leaves, mesh, blocks, boxes } = self;
+        let (all, reader) = (leaves.as_flattened(), mesh.reader());
+        boxes.clear();
+        for (index, (leaf, block)) in leaves.iter().zip(blocks).enumerate() {
+            for lane in 0..LANES {
+                ahead::ask(simd, reader, index * LANES + lane, |place| all.get(place).copied());
+            }
+            boxes.push(fill(leaf, reader, block));
+        }
+    }
+}
+
+/// Put triangles into a block; returns the box around them.
 #[inline(always)]
-fn fill(leaf: &[u32; LANES], mesh: &Mesh, block: &mut Block) -> BoundsA {
+fn fill(leaf: &[u32; LANES], reader: Reader<'_>, block: &mut Block) -> BoundsA {
     let mut bounds = BoundsA::EMPTY;
+    let mut corners = [[Vec4::ZERO; LANES]; 3];
     for (lane, &triangle) in leaf.iter().enumerate().take_while(|(_, triangle)| **triangle != MISS) {
-        let corners = mesh.corners(triangle);
-        bounds = bounds.union(&BoundsA::of_corners(corners));
-        block.set(lane, triangle, corners);
+        let triangle = reader.corners(triangle);
+        bounds = bounds.union(&BoundsA::of_aligned_corners(triangle));
+        for c in 0..3 {
+            corners[c][lane] = triangle[c].extend(0.0);
+        }
+    }
+    for (corner, [a, b, c, d, e, f, g, h]) in block.corner.iter_mut().zip(corners) {
+        let halves = [Mat4::from_cols(a, b, c, d), Mat4::from_cols(e, f, g, h)].map(|half| half.transpose());
+        for k in 0..3 {
+            corner[k][..4].copy_from_slice(&halves[0].col(k).to_array());
+            corner[k][4..].copy_from_slice(&halves[1].col(k).to_array());
+        }
     }
     block.primitive = *leaf;
     bounds

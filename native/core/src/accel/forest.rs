@@ -12,6 +12,7 @@ use crate::{
     Error, Job, Mesh,
     arena::Arena,
     bounds::BoundsA,
+    simd::Level,
     traverse::frame::Domain,
     triangle::{Block, LANES},
 };
@@ -51,8 +52,8 @@ struct Written {
 pub fn write(top: &Top, drafts: &[Draft], mesh: &Mesh, job: &Job) -> Result<Structure, Error> {
     let domain = Domain::new(&mesh.bounds());
     let total = |count: fn(&Draft) -> usize| drafts.iter().map(count).sum::<usize>();
-    let mut nodes = Arena::zeroed(top.nodes.len() + total(|draft| draft.nodes.len()), "the nodes")?;
-    let mut blocks = Arena::zeroed(total(|draft| draft.leaves.len()), "the leaves")?;
+    let mut nodes = Arena::stale(top.nodes.len() + total(|draft| draft.nodes.len()), "the nodes")?;
+    let mut blocks = Arena::stale(total(|draft| draft.leaves.len()), "the leaves")?;
     let (top_nodes, below) = nodes.split_at_mut(top.nodes.len());
     let sites = sites(drafts, top.nodes.len(), below, &mut blocks);
     let subtrees: Result<Vec<Written>, Error> = sites
@@ -90,7 +91,7 @@ fn sites<'a>(
 }
 
 fn write_subtree(mut site: Site<'_>, draft: &Draft, mesh: &Mesh, centre: Vec3A, boxes: &mut Boxes) -> Written {
-    let bounds = draft::fit(draft, mesh, centre, &mut site, boxes);
+    let bounds = draft::fit(draft, mesh, centre, &mut site, boxes, Level::detect());
     Written { root: draft.root.moved(site.first_node, site.first_block), bounds, stack_size: draft.stack_size }
 }
 

@@ -26,7 +26,7 @@ pub fn judge(built: BuiltGrid, mesh: &Mesh, config: &Config) -> Result<(BuiltGri
     let Structure { mut grids, starts, references, .. } = structure;
     let built = BuiltGrid { grid: grids.swap_remove(0), starts, references };
     let Occupancy { sparseness, spread } = Occupancy::of(&built);
-    let triangles = mesh.solid().len();
+    let triangles = mesh.solid_count();
     let to_come = config.expected_rays / samples.len() as f64;
     let grid = to_come * walks.nanoseconds(&config.cost);
     let bvh = to_come * hierarchy(&walks, samples.len(), triangles, config) + build(triangles, config);

@@ -13,6 +13,7 @@ use glam::Vec3A;
 use rayon::prelude::*;
 
 use super::{
+    ahead,
     bins::Bins,
     lazy::{Cell, LazyCells},
     morton::{self, Key},
@@ -26,7 +27,7 @@ use crate::{
     arena::Arena,
     bounds::{Bounds, BoundsA},
     error,
-    simd::Level,
+    simd::{Kernel, Level, Simd},
     traverse::frame::Domain,
     triangle::LANES,
 };
@@ -73,8 +74,7 @@ pub fn build(mesh: &Mesh, job: &Job) -> Result<Structure, Error> {
     let work = Work { keys: &keys, blocks: &blocks, centre, scale: cube.scale(), level, job };
     let (mut part, mut bins) = (Part::default(), Bins::EMPTY);
     let placed = work.above(Set::new(&mut records, &mut spare), &mut bins, &mut part)?;
-    let mut nodes = Arena::zeroed(part.nodes.len(), "the nodes")?;
-    nodes.copy_from_slice(&part.nodes);
+    let nodes = Arena::copied(&part.nodes, "the nodes")?;
     let lazy = LazyCells::new(part.triangles, part.cells)?;
     // A subtree of so many triangles never has more entries on the stack than it has leaves beside the current one.
     Ok(Structure { nodes, lazy, stack_size: placed.stack_size + CELL, ..Structure::of(placed.root, domain) })
@@ -101,22 +101,44 @@ impl Blocks {
         divider.divide(keys, 0, true);
         let Divider { ends, large, .. } = divider;
         let mut items = error::filled(ends.len(), Item::NONE, WHAT)?;
-        let keys = &*keys;
+        let (keys, level) = (&*keys, Level::detect());
         items.par_chunks_mut(PART).zip(ends.par_chunks(PART)).enumerate().try_for_each(
             |(part, (items, part_ends))| {
                 job.check()?;
-                let mut first = (part * PART).checked_sub(1).map_or(0, |before| ends[before]);
-                for (item, &end) in items.iter_mut().zip(part_ends) {
-                    let keys = &keys[first as usize..end as usize];
-                    let boxes = keys.iter().map(|key| BoundsA::of_corners(mesh.corners(key.triangle())));
-                    let bounds = boxes.fold(BoundsA::EMPTY, |all, bounds| all.union(&bounds));
-                    *item = Item { bounds, count: end - first };
-                    first = end;
-                }
+                let first = (part * PART).checked_sub(1).map_or(0, |before| ends[before]);
+                level.run(Fetch { mesh, keys: &keys[first as usize..], ends: part_ends, first, items });
                 Ok(())
             },
         )?;
         Ok(Self { ends, items, large })
+    }
+}
+
+/// Finds the boxes of small blocks, the first of which begins where `keys` do.
+struct Fetch<'a> {
+    mesh: &'a Mesh,
+    keys: &'a [Key],
+    ends: &'a [u32],
+    first: u32,
+    items: &'a mut [Item],
+}
+
+impl Kernel for Fetch<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) {
+        let Self { mesh, keys, ends, first, items } = self;
+        let (mut place, reader) = (0, mesh.reader());
+        for (item, &end) in items.iter_mut().zip(ends) {
+            *item = Item { bounds: BoundsA::EMPTY, count: end - first - place as u32 };
+            while place < (end - first) as usize {
+                ahead::ask(simd, reader, place, |place| keys.get(place).map(|key| key.triangle()));
+                let corners = reader.corners(keys[place].triangle());
+                item.bounds = item.bounds.union(&BoundsA::of_aligned_corners(corners));
+                place += 1;
+            }
+        }
     }
 }
 
@@ -154,7 +176,10 @@ impl Divider<'_> {
     fn crowded(&mut self, keys: &mut [Key], first: usize, above: bool) {
         let centre = |key: &Key| Bounds::of_points(self.mesh.corners(key.triangle())).centre();
         let cube = UnitCube::new(&Bounds::of_points(keys.iter().map(centre)));
-        keys.par_iter_mut().with_min_len(PART).for_each(|key| *key = morton::key(self.mesh, &cube, key.triangle()));
+        let reader = self.mesh.reader();
+        keys.par_iter_mut()
+            .with_min_len(PART)
+            .for_each(|key| *key = morton::key(reader.corners(key.triangle()), &cube, key.triangle()));
         keys.par_sort_unstable();
         if keys[0].code() != keys[keys.len() - 1].code() {
             return self.divide(keys, first, above);

@@ -1,5 +1,6 @@
 //! Accelerators: one structure of branches, leaves and grids, and the methods that decide which is where.
 
+mod ahead;
 pub mod bins;
 pub mod calibrate;
 pub mod cells;
@@ -104,7 +105,7 @@ impl Accelerator {
     /// [`Error::Config`], [`Error::Cancelled`], [`Error::OutOfMemory`].
     pub fn build(mesh: Arc<Mesh>, method: Method, config: &Config, threads: usize, job: &Job) -> Result<Self, Error> {
         config.check()?;
-        job.begin(Phase::Build, method.passes() * mesh.solid().len() as u64);
+        job.begin(Phase::Build, method.passes() * mesh.solid_count() as u64);
         let mut builder = Builder { mesh: &mesh, config, job, phases: Vec::new(), decisions: Vec::new() };
         let structure = pool::install(threads, || builder.structure(method.recipe()))??;
         let Builder { phases, decisions, .. } = builder;
@@ -228,7 +229,7 @@ impl Builder<'_> {
 
     fn reinserted(&mut self, hierarchy: Hierarchy) -> Result<Tree, Error> {
         let tree = self.hierarchy(hierarchy)?;
-        let units = self.mesh.solid().len() as u64;
+        let units = self.mesh.solid_count() as u64;
         self.timed("reinsert", |this| reinsert::improve(tree, &this.mesh.bounds(), this.config, this.job, units))
     }
 
@@ -252,7 +253,7 @@ impl Builder<'_> {
     }
 
     fn cheapest(&mut self) -> Result<Structure, Error> {
-        let triangles = self.mesh.solid().len();
+        let triangles = self.mesh.solid_count();
         let builder = choice::estimates(triangles, self.config)[0].builder;
         // Progress was promised for the builder that goes through all triangles most often.
         self.job.advance(builder.passes_saved() * triangles as u64);

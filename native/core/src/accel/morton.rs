@@ -3,10 +3,16 @@
 
 use std::slice::IterMut;
 
+use glam::Vec3A;
 use rayon::prelude::*;
 
-use super::record::UnitCube;
-use crate::{Error, Job, Mesh, arena::Arena, error};
+use super::{ahead, record::UnitCube};
+use crate::{
+    Error, Job, Mesh,
+    arena::Arena,
+    error,
+    simd::{Kernel, Level, Simd},
+};
 
 /// A triangle with its code along the curve, which orders keys: the code in the upper bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, bytemuck::Pod, bytemuck::Zeroable)]
@@ -58,15 +64,15 @@ type Histogram = [u32; BUCKETS];
 /// [`Error::Cancelled`], [`Error::OutOfMemory`].
 pub fn sorted(mesh: &Mesh, job: &Job) -> Result<Arena<Key>, Error> {
     const WHAT: &str = "the order of triangles";
-    let solid = mesh.solid();
-    let (mut keys, mut other) = (Arena::zeroed(solid.len(), WHAT)?, Arena::zeroed(solid.len(), WHAT)?);
-    let part = solid.len().div_ceil(rayon::current_num_threads()).clamp(PART, STEP);
-    let mut histograms: Vec<[Histogram; 3]> = error::filled(solid.len().div_ceil(part), [[0; BUCKETS]; 3], WHAT)?;
-    let cube = UnitCube::new(&mesh.bounds());
-    let parts = keys.par_chunks_mut(part).zip(solid.par_chunks(part)).zip(&mut histograms);
-    parts.try_for_each(|((keys, solid), histograms)| {
+    let count = mesh.solid_count();
+    let (mut keys, mut other) = (Arena::stale(count, WHAT)?, Arena::stale(count, WHAT)?);
+    let part = count.div_ceil(rayon::current_num_threads()).clamp(PART, STEP);
+    let mut histograms: Vec<[Histogram; 3]> = error::filled(count.div_ceil(part), [[0; BUCKETS]; 3], WHAT)?;
+    let (cube, level) = (UnitCube::new(&mesh.bounds()), Level::detect());
+    let parts = keys.par_chunks_mut(part).zip(&mut histograms).enumerate();
+    parts.try_for_each(|(index, (keys, histograms))| {
         job.check()?;
-        encode(mesh, &cube, solid, keys, histograms);
+        level.run(Encode { mesh, cube: &cube, first: index * part, keys, histograms });
         Ok(())
     })?;
     for pass in 0..3 {
@@ -79,20 +85,41 @@ pub fn sorted(mesh: &Mesh, job: &Job) -> Result<Arena<Key>, Error> {
     Ok(keys)
 }
 
+/// A number below 2^22 plus this has its integer in the low bits, and needs no instruction to convert it.
+const INTEGER: f32 = (3 << 22) as f32;
+
 /// The key of a triangle whose box has its middle in `cube`.
 #[inline(always)]
-pub fn key(mesh: &Mesh, cube: &UnitCube, triangle: u32) -> Key {
-    let bounds = cube.bounds(mesh.corners(triangle));
+pub fn key(corners: [Vec3A; 3], cube: &UnitCube, triangle: u32) -> Key {
+    let bounds = cube.bounds(corners);
     let place = (bounds.lower + bounds.upper) * (BUCKETS / 2) as f32;
-    let [x, y, z] = place.to_array().map(|place| spread((place as u32).min(BUCKETS as u32 - 1)));
+    let place = (place - 0.5).max(Vec3A::ZERO).min(Vec3A::splat((BUCKETS - 1) as f32)) + INTEGER;
+    let [x, y, z] = [place.x, place.y, place.z].map(|place| spread(place.to_bits()));
     Key::new(x << 2 | y << 1 | z, triangle)
 }
 
-fn encode(mesh: &Mesh, cube: &UnitCube, solid: &[u32], keys: &mut [Key], histograms: &mut [Histogram; 3]) {
-    for (key, &triangle) in keys.iter_mut().zip(solid) {
-        *key = self::key(mesh, cube, triangle);
-        for (pass, histogram) in histograms.iter_mut().enumerate() {
-            histogram[key.digit(pass as u32)] += 1;
+/// Makes the keys of solid triangles from the one with the number `first` on, and counts their digits.
+struct Encode<'a> {
+    mesh: &'a Mesh,
+    cube: &'a UnitCube,
+    first: usize,
+    keys: &'a mut [Key],
+    histograms: &'a mut [Histogram; 3],
+}
+
+impl Kernel for Encode<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) {
+        let Self { mesh, cube, first, keys, histograms } = self;
+        let reader = mesh.reader();
+        for (key, triangle) in keys.iter_mut().zip(mesh.solid(first)) {
+            ahead::ask(simd, reader, triangle as usize, |place| u32::try_from(place).ok());
+            *key = self::key(reader.corners(triangle), cube, triangle);
+            for (pass, histogram) in histograms.iter_mut().enumerate() {
+                histogram[key.digit(pass as u32)] += 1;
+            }
         }
     }
 }
@@ -125,6 +152,11 @@ fn scatter(
     histograms: &[[Histogram; 3]],
     job: &Job,
 ) -> Result<(), Error> {
+    if let [histograms] = histograms {
+        job.check()?;
+        scatter_alone(from, to, pass, &histograms[pass as usize]);
+        return Ok(());
+    }
     let mut buckets: Vec<Vec<IterMut<'_, Key>>> = Vec::new();
     for _ in histograms {
         buckets.push(error::reserve(BUCKETS, "sorting")?);
@@ -146,6 +178,20 @@ fn scatter(
         }
         Ok(())
     })
+}
+
+/// The same by one thread, which needs to remember less of where it is.
+fn scatter_alone(from: &[Key], to: &mut [Key], pass: u32, histogram: &Histogram) {
+    let mut place = 0;
+    let mut places = histogram.map(|count| {
+        place += count;
+        place - count
+    });
+    for key in from {
+        let place = &mut places[key.digit(pass)];
+        to[*place as usize] = *key;
+        *place += 1;
+    }
 }
 
 #[cfg(test)]

@@ -42,7 +42,7 @@ pub fn pack_opened(tree: &Tree, mesh: &Mesh, opening: Opening, job: &Job) -> Res
     let collapse = (opening == Opening::Cheapest).then(|| Collapse::new(tree)).transpose()?;
     // What is in the cells of nests is not counted, however often it is there.
     let items = if tree.nests.is_empty() { tree.items.len() } else { 0 };
-    let surplus = items.saturating_sub(mesh.solid().len()) as u64;
+    let surplus = items.saturating_sub(mesh.solid_count()) as u64;
     let (lattices, nested, centre) = (Lattices::default(), 0, domain.centre);
     let mut packer = Packer { tree, mesh, job, centre, surplus, collapse, nodes, blocks, lattices, nested };
     let packed = if tree.nodes.is_empty() { Packed::EMPTY } else { packer.subtree(0)? };

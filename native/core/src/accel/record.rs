@@ -134,8 +134,8 @@ impl UnitCube {
 
     /// The mapped box of a triangle.
     #[inline(always)]
-    pub fn bounds(&self, corners: [Vec3; 3]) -> BoundsA {
-        self.mapped(&BoundsA::of_corners(corners))
+    pub fn bounds(&self, corners: [Vec3A; 3]) -> BoundsA {
+        self.mapped(&BoundsA::of_aligned_corners(corners))
     }
 
     /// A mapped box.

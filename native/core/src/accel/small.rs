@@ -10,6 +10,7 @@ use crate::{
     Error, Mesh,
     bounds::{Bounds, BoundsA},
     error,
+    simd::Level,
     traverse::frame::Domain,
     triangle::{Block, LANES},
 };
@@ -31,12 +32,25 @@ pub struct Subtree {
 }
 
 /// Builds one subtree after the other, in the same room.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct SmallBuilder {
     items: Vec<Item>,
     sweep: Sweep,
     draft: Draft,
     boxes: Boxes,
+    level: Level,
+}
+
+impl Default for SmallBuilder {
+    fn default() -> Self {
+        Self {
+            items: Vec::new(),
+            sweep: Sweep::default(),
+            draft: Draft::EMPTY,
+            boxes: Boxes::default(),
+            level: Level::detect(),
+        }
+    }
 }
 
 impl SmallBuilder {
@@ -48,7 +62,8 @@ impl SmallBuilder {
     /// [`Error::OutOfMemory`].
     pub fn build(&mut self, mesh: &Mesh, triangles: &[u32]) -> Result<Subtree, Error> {
         let Self { items, draft, sweep, .. } = self;
-        let item = |&triangle| Item { bounds: BoundsA::of_corners(mesh.corners(triangle)), count: 1 };
+        let reader = mesh.reader();
+        let item = |&triangle| Item { bounds: BoundsA::of_aligned_corners(reader.corners(triangle)), count: 1 };
         items.clear();
         items.extend(triangles.iter().map(item));
         draft.clear();
@@ -62,12 +77,12 @@ impl SmallBuilder {
     }
 
     fn write(&mut self, mesh: &Mesh) -> Result<Subtree, Error> {
-        let Self { draft, boxes, .. } = self;
+        let Self { draft, boxes, level, .. } = self;
         let domain = Domain::new(&mesh.bounds());
         let mut nodes = error::filled(draft.nodes.len(), Node::EMPTY, "the nodes of a subtree")?;
         let mut blocks = error::filled(draft.leaves.len(), Block::EMPTY, "the leaves of a subtree")?;
         let mut site = Site { nodes: &mut nodes, blocks: &mut blocks, first_node: 0, first_block: 0 };
-        let bounds = draft::fit(draft, mesh, domain.centre.into(), &mut site, boxes).into();
+        let bounds = draft::fit(draft, mesh, domain.centre.into(), &mut site, boxes, *level).into();
         Ok(Subtree { root: draft.root, nodes, blocks, stack_size: draft.stack_size, bounds })
     }
 }
@@ -124,7 +139,7 @@ mod tests {
         for count in [0, 1, 8, 9, 64, 65, 3000] {
             let mesh = mesh(count);
             let Subtree { root, nodes, blocks, stack_size, bounds } =
-                SmallBuilder::default().build(&mesh, mesh.solid()).unwrap();
+                SmallBuilder::default().build(&mesh, &mesh.solid(0).collect::<Vec<_>>()).unwrap();
             assert_eq!(bounds, mesh.bounds());
             let (nodes, blocks) = (arena(&nodes), arena(&blocks));
             let empty = Structure::of(root, Domain::new(&mesh.bounds()));

@@ -4,7 +4,11 @@
 use rayon::prelude::*;
 
 use super::{grid::BuiltGrid, structure::Grid};
-use crate::{Error, Job, Mesh, bounds::Bounds, error};
+use crate::{
+    Error, Job, Mesh,
+    bounds::{Bounds, BoundsA},
+    error,
+};
 
 /// A triangle on its way into the tree.
 #[derive(Debug, Clone, Copy)]
@@ -13,6 +17,10 @@ pub struct Item {
     pub bounds: Bounds,
     /// Which triangle.
     pub primitive: u32,
+}
+
+impl Item {
+    const NONE: Self = Self { bounds: Bounds::EMPTY, primitive: 0 };
 }
 
 /// What a node is.
@@ -94,14 +102,13 @@ pub trait Split: Sync {
 /// # Errors
 /// [`Error::OutOfMemory`].
 pub fn items(mesh: &Mesh) -> Result<Vec<Item>, Error> {
-    let solid = mesh.solid();
-    let mut items = error::reserve(solid.len(), "the list of triangle boxes")?;
-    items.par_extend(
-        solid
-            .par_iter()
-            .with_min_len(1 << 12)
-            .map(|&primitive| Item { bounds: Bounds::of_points(mesh.corners(primitive)), primitive }),
-    );
+    let mut items = error::filled(mesh.solid_count(), Item::NONE, "the list of triangle boxes")?;
+    items.par_chunks_mut(SEQUENTIAL).enumerate().for_each(|(part, items)| {
+        let reader = mesh.reader();
+        for (item, primitive) in items.iter_mut().zip(mesh.solid(part * SEQUENTIAL)) {
+            *item = Item { bounds: BoundsA::of_aligned_corners(reader.corners(primitive)).into(), primitive };
+        }
+    });
     Ok(items)
 }
 

@@ -49,9 +49,8 @@ pub fn brute_force(mesh: &Mesh, rays: &RayBatch) -> Hits {
     for index in 0..rays.len() {
         let frame = Frame::new(&rays.ray(index), &domain).unwrap();
         let tests = mesh
-            .solid()
-            .iter()
-            .filter_map(|&t| triangle::intersect(&frame, mesh.corners(t).map(|corner| corner.to_array()), t));
+            .solid(0)
+            .filter_map(|t| triangle::intersect(&frame, mesh.corners(t).map(|corner| corner.to_array()), t));
         let best = tests.fold(Hit::MISS, |best, hit| if hit.precedes(&best) { hit } else { best });
         if best.primitive != MISS {
             hits.as_mut().set(index, Hit { t: frame.parameter(best.t), ..best });
