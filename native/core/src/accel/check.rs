@@ -153,6 +153,13 @@ pub(super) fn assert_lists(structure: &Structure, mesh: &Mesh, bounds: &Bounds, 
 /// What remains of a triangle in a box after a cut along every side, in double precision. Shares no arithmetic with the
 /// separating axes that grids are built by.
 pub(super) fn clipped(bounds: &Bounds, corners: [Vec3; 3]) -> Vec<DVec3> {
+    let is_beside = |axis: usize| {
+        corners.iter().all(|corner| corner[axis] < bounds.lower[axis])
+            || corners.iter().all(|corner| corner[axis] > bounds.upper[axis])
+    };
+    if (0..3).any(is_beside) {
+        return Vec::new(); // as the first cuts would find, of nearly every cell and triangle
+    }
     let mut polygon = corners.map(|corner| corner.as_dvec3()).to_vec();
     for axis in 0..3 {
         let (lower, upper) = (f64::from(bounds.lower[axis]), f64::from(bounds.upper[axis]));

@@ -131,7 +131,12 @@ fn reaches(grid: &Grid, index: usize, corners: [Vec3; 3], margin: f64) -> bool {
     let rest =
         |point: DVec3, k: usize| (point[k] - f64::from(grid.lower[k])) / f64::from(grid.cell[k]) - f64::from(cell[k]);
     let slack = |k: usize| margin / f64::from(grid.cell[k]);
-    let mut polygon = corners.map(|corner| corner.as_dvec3()).to_vec();
+    let corners = corners.map(|corner| corner.as_dvec3());
+    let is_beyond = corners.iter().all(|&point| 1.0 + slack(first) - rest(point, first) < 0.0);
+    if is_beyond || corners.iter().all(|&point| rest(point, third) + slack(third) < 0.0) {
+        return false; // as the first cuts would find, of nearly every tetrahedron and triangle
+    }
+    let mut polygon = corners.to_vec();
     polygon = check::cut(&polygon, |point| 1.0 + slack(first) - rest(point, first));
     polygon = check::cut(&polygon, |point| rest(point, third) + slack(third));
     for (a, b) in [(first, second), (second, third)] {
