@@ -19,14 +19,29 @@ class NativeError(Exception):
 
 def build(profile: str = "release") -> Path:
     """Compile the harness with one of cargo's profiles and return its binary. Raises NativeError."""
-    command = ["cargo", "build", "--quiet", "--profile", profile, "-p", "espalier-bench"]
-    command.append("--message-format=json-render-diagnostics")
+    return _compiled("build", "--profile", profile, "-p", "espalier-bench")
+
+
+def build_as_tested() -> Path:
+    """The binary that `cargo test` made; compiled again on its own, the core would not share its units."""
+    return _compiled("test", "--workspace", "--no-run")
+
+
+def _compiled(*arguments: str) -> Path:
+    command = ["cargo", *arguments, "--quiet", "--message-format=json-render-diagnostics"]
     done = subprocess.run(command, cwd=WORKSPACE, stdout=subprocess.PIPE, text=True, check=False)
     messages = (json.loads(line) for line in done.stdout.splitlines())
-    binaries = [message["executable"] for message in messages if message.get("executable")]
+    binaries = [message["executable"] for message in messages if _is_harness(message)]
     if done.returncode or not binaries:
         raise NativeError("the benchmark harness does not compile, see above")
     return Path(binaries[-1])
+
+
+def _is_harness(message: dict[str, Any]) -> bool:
+    """Whether a message of cargo's is of the harness itself, not of its tests."""
+    if not message.get("executable"):
+        return False
+    return message["target"]["name"] == "espalier-bench" and not message["profile"]["test"]
 
 
 def embree() -> Path:

@@ -61,7 +61,7 @@ def test_a_folder_without_models_is_refused(defined: definitions.Definitions, tm
 
 @pytest.fixture(scope="module")
 def binary() -> Path:
-    return harness.build(profile="test")  # that of `cargo test`, so that most of it is compiled already
+    return harness.build_as_tested()
 
 
 def _quad(directory: Path) -> dict:
