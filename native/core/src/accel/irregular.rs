@@ -3,6 +3,11 @@
 //! heuristic finds the union cheaper than the two; then each cell's box, as far as rays are concerned, is expanded over
 //! neighbours that list nothing it does not list itself.
 //!
+//! Unlike theirs, the voxel map is flat: they give every cell of a coarse grid a resolution of its own and look a voxel
+//! up in two steps; here one uniform grid is merged, and a voxel's number leads to its cell in one. So a step is as cheap
+//! as it can be, and builds and walks share the uniform grid's code; but there are four bytes for every voxel, and a
+//! small crowded place in a large scene stays as coarse as the rest, as it does in `grid`.
+//!
 //! Measured against the grid it is made of (bunny, dragon, Sponza): a quarter to a ninth of the steps of lines, 1.04 to
 //! 1.8 times the tests, and 0.65 to 1.2 times the time of a ray for 3 to 5 times the time of building. On soups, where
 //! nothing is empty, a third fewer steps are outweighed by 1.8 times the tests: 1.6 to 2 times the time.
