@@ -29,8 +29,8 @@ HEAT_SIDE = 144
 MOST_CELLS = 4_000_000
 """Most leaves and cells whose triangles are counted for a histogram."""
 
-LEAF, CELL = 1, 3
-"""Kinds of boxes in `espalier_rt.Cells` that hold triangles."""
+HOLDERS = (1, 3, 4, 5)
+"""Kinds of boxes in `espalier_rt.Cells` that hold triangles: leaves, cells, tetrahedra, lazy cells not yet reached."""
 
 
 @dataclass(frozen=True)
@@ -205,7 +205,7 @@ def _by_rows(counts: NDArray[np.uint32], size: tuple[int, int]) -> NDArray[np.ui
 def _occupancy(accelerator: Any) -> tuple[int, ...]:
     """Leaves and occupied cells by the power of two that their triangles stay within."""
     cells = accelerator.cells(occupied_only=True, max_count=MOST_CELLS)
-    holds = cells.count[((cells.kind == LEAF) | (cells.kind == CELL)) & (cells.count > 0)]
+    holds = cells.count[np.isin(cells.kind, HOLDERS) & (cells.count > 0)]
     if not len(holds):
         return ()
     return tuple(int(count) for count in np.bincount(np.ceil(np.log2(holds)).astype(int)))

@@ -3,11 +3,13 @@
 import csv
 import io
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from studies import FINGERPRINT, PLAN, finished, load, make, squashed
 
+from espalier import native
 from espalier.study import measure
 from espalier.study.journal import NAME, Journal, forget, is_interrupted
 from espalier.study.plan import Case, Plan, StudyError
@@ -34,6 +36,16 @@ def test_every_case_has_times_evidence_and_the_same_hits(tmp_path: Path) -> None
     assert found.reference == "bvh-median"
     reference = found.find(next(PLAN.groups()), "bvh-median")
     assert reference.relative["total_s"].median == 1.0
+
+
+def test_every_method_tells_where_its_triangles_and_its_steps_are(tmp_path: Path) -> None:
+    plan = replace(PLAN, scenes=("large",), methods=tuple(native.module().methods()), classes=("primary",), repeats=1)
+    found = finished(tmp_path, plan).results
+    assert [row.method for row in found.rows] == list(plan.methods)
+    for row in found.rows:
+        assert sum(row.evidence.occupancy) > 0, row.method
+        assert sum(row.evidence.census["depth_histogram"]) > 0, row.method
+        assert row.evidence.heat, row.method
 
 
 def test_json_and_csv_say_the_same(tmp_path: Path) -> None:

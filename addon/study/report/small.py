@@ -79,7 +79,7 @@ def heat_maps(results: Results, group: Group) -> str:
         counts = maps[method]
         shades = np.round(np.sqrt(np.clip(counts / brightest, 0, 1)) * (SHADES - 1)) / (SHADES - 1)
         mean = svg.digits(float(counts.mean()))
-        caption = tag("figcaption", html.escape(method), tag("span", f"{mean} steps"))
+        caption = tag("figcaption", html.escape(method).replace("+", "<wbr>+"), tag("span", f"{mean} steps"))
         image = embedded(difference_colors(shades.astype(np.float32)), f"Steps per pixel, {method}")
         figures.append(tag("figure", image, caption, class_="heat", data_method=method))
     ramp = np.broadcast_to(np.linspace(0, 1, SHADES, dtype=np.float32), (4, SHADES))

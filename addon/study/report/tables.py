@@ -20,14 +20,14 @@ def paper_table(results: Results, paper: Paper) -> str:
     methods = {what: name for what, name in paper.methods.items() if name in results.plan.methods}
     best = next((name for name in marks.ranking(results) if family(name) == "hybrid"), None)
     beside = [best] if best and best not in methods.values() else []
-    columns = [f"{what} ({name})" for what, name in methods.items()]
+    columns = [what if what == name else f"{what} ({name})" for what, name in methods.items()]
     first = tag(
         "tr",
         tag("th", rowspan=2),
         _wide("Triangles", 2),
         _wide("Triangles a vertex", 2),
         *(_wide(name, 3) for name in columns),
-        *(_wide("best hybrid", 1) for _ in beside),
+        *(tag("th", "best hybrid") for _ in beside),
     )
     second = tag(
         "tr",
