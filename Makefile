@@ -13,7 +13,7 @@ PORTABLE   := $(if $(filter Linux,$(shell uname)),--zig --compatibility manylinu
 VERSION    := $(shell sed -n 's/^version = "\(.*\)"/\1/p' blender_manifest.toml)
 ZIP        := dist/espalier-$(VERSION).zip
 
-.PHONY: help demo study test test-aarch64 check format bench bench-instructions bench-interfaces bench-growth bench-threads package clean
+.PHONY: help demo study test test-native test-addon test-aarch64 check check-native check-addon format bench bench-instructions bench-interfaces bench-growth bench-threads package clean
 .DELETE_ON_ERROR:
 
 help: ## List these commands
@@ -25,19 +25,27 @@ demo: .venv/ready ## Trace a scene with every method and with Cycles: make demo 
 study: .venv/ready ## Measure every method on the paper's scenes: make study [INPUTS="dragon city"], report in out/study
 	$(BIN)/espalier study $(INPUTS)
 
-test: .venv/ready $(ZIP) ## Run every test that needs no installed Blender
+test: test-native test-addon ## Run every test that needs no installed Blender
+
+test-native: ## Run the Rust tests alone
 	$(CARGO) test --workspace
-	$(BIN)/pytest tests/python
+
+test-addon: .venv/ready $(ZIP) ## Run the Python tests alone
 	$(BIN)/pytest tests/headless
+	$(BIN)/pytest tests/python
 
 test-aarch64: ## Run the core's tests compiled for aarch64, in an emulator: needs that target, its gcc and qemu-user
 	$(CARGO) test -p espalier-core --target aarch64-unknown-linux-gnu \
 	  --config 'target.aarch64-unknown-linux-gnu.linker = "aarch64-linux-gnu-gcc"' \
 	  --config 'target.aarch64-unknown-linux-gnu.runner = ["qemu-aarch64", "-L", "/usr/aarch64-linux-gnu"]'
 
-check: .venv/ready ## Check form, lints and types of Rust and Python
+check: check-native check-addon ## Check form, lints and types of Rust and Python
+
+check-native:
 	$(CARGO) fmt --all --check
 	$(CARGO) clippy --workspace --all-targets -- -D warnings
+
+check-addon: .venv/ready
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy

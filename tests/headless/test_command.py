@@ -211,7 +211,7 @@ def test_a_study_takes_scenes_that_only_blender_opens(tmp_path: Path, scene: bpy
 def test_an_interrupted_study_goes_on_with_the_same_command(tmp_path: Path, sent: signal.Signals) -> None:
     out = tmp_path / "out"
     options = ("cornell_box", "city", "--methods", "grid,bvh-sah", "--resolutions", "1000x1000", "--no-embree")
-    arguments = ("study", *options, "--repeats", 20, "--out", out)
+    arguments = ("study", *options, "--repeats", 20, "--seconds", 2, "--out", out)
     with subprocess.Popen(command(*arguments), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
         journal = out / "runs.jsonl"
         wait_for(lambda: journal.exists() and journal.read_text().count('"run"') > 2)
