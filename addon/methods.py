@@ -21,7 +21,7 @@ METHODS: tuple[Method, ...] = (
     Method(
         "bvh-median+reinsert",
         "BVH (Median Split, Reinserted)",
-        "The same, its subtrees then moved to where they make boxes smaller",
+        "BVH (Median Split) whose subtrees are then moved to where they make boxes smaller",
     ),
     Method(
         "bvh-sah", "BVH (SAH)", "Bounding volume hierarchy split where the surface area heuristic expects least work"
@@ -29,7 +29,7 @@ METHODS: tuple[Method, ...] = (
     Method(
         "bvh-sah+reinsert",
         "BVH (SAH, Reinserted)",
-        "The same, its subtrees then moved to where they make boxes smaller",
+        "BVH (SAH) whose subtrees are then moved to where they make boxes smaller",
     ),
     Method(
         "sbvh",
@@ -39,7 +39,7 @@ METHODS: tuple[Method, ...] = (
     Method(
         "sbvh+reinsert",
         "BVH (Spatial Splits, Reinserted)",
-        "The same, its subtrees then moved to where they make boxes smaller",
+        "BVH (Spatial Splits) whose subtrees are then moved to where they make boxes smaller",
     ),
     Method(
         "ploc",
@@ -49,12 +49,12 @@ METHODS: tuple[Method, ...] = (
     Method(
         "ploc+reinsert",
         "BVH (Locally Ordered, Reinserted)",
-        "The same, its subtrees then moved to where they make boxes smaller",
+        "BVH (Locally Ordered) whose subtrees are then moved to where they make boxes smaller",
     ),
     Method(
         "bvh-clusters",
         "BVH (Clusters)",
-        "The same heuristic over clusters of up to four triangles: about half the build time, nearly as good to trace",
+        "Surface area heuristic over clusters of up to four triangles: half the time to build, nearly as good to trace",
     ),
     Method("lbvh", "Linear BVH", "Bounding volume hierarchy along a space-filling curve: the fastest to build"),
     Method("grid", "Uniform Grid", "One uniform grid of cells over the whole scene"),
@@ -79,7 +79,7 @@ METHODS: tuple[Method, ...] = (
     Method(
         "hybrid-sequential",
         "Hybrid (Sequential)",
-        "The same, with as many sample rays through each node as it takes to be certain of the verdict",
+        "Hybrid (Sampled) with as many sample rays through each node as it takes to be certain of the verdict",
     ),
     Method(
         "hybrid",

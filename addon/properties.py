@@ -13,9 +13,16 @@ from bpy.props import (
 )
 
 from .areas import redraw
-from .methods import COMPARED_METHODS, DEFAULT_METHOD, METHODS
+from .methods import COMPARED_METHODS, DEFAULT_METHOD, GROUPS, METHODS
 
-METHOD_ITEMS = [(method.name, method.label, method.description, index) for index, method in enumerate(METHODS)]
+METHOD_ITEMS = [
+    item
+    for heading, belongs in GROUPS.items()
+    for item in (
+        ("", heading, "", 0),  # a column of its own in the list
+        *((name, label, text, index) for index, (name, label, text) in enumerate(METHODS) if belongs(name)),
+    )
+]
 METHOD_FLAGS = [(method.name, method.label, method.description, 1 << index) for index, method in enumerate(METHODS)]
 STATIC: Any = set()
 """Property options of a setting that cannot be animated."""

@@ -63,9 +63,12 @@ def draw_notes(layout: Layout, notes: Sequence[str], width: float) -> None:
 
 
 def draw_methods(layout: Layout, settings: Any) -> None:
-    """Which methods the buttons run, by kind."""
+    """Which methods the buttons run: kinds side by side where there is room. The names stand on the buttons alone."""
+    layout.use_property_split = False
+    kinds = layout.grid_flow(row_major=True, even_columns=True)
     for heading, belongs in methods.GROUPS.items():
-        column = layout.column(heading=heading, align=True)
+        column = kinds.column(align=True)
+        column.label(text=heading)
         for name in filter(belongs, methods.METHOD_NAMES):
             column.prop_enum(settings, "methods", name)
 
