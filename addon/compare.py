@@ -30,7 +30,7 @@ from .run import MethodResult, Options, Run
 from .scene_data import Float32, SceneData
 
 POLL_SECONDS = 0.03
-"""How often the thread looks for a cancel."""
+"""How often the thread looks for a cancel while the second Blender works."""
 
 CENSUS_COUNTS = ("bytes", "nodes", "leaves", "grids", "cells", "empty_cells", "references")
 
@@ -137,9 +137,7 @@ class Comparison(Background):
         )
 
     def _trace(self) -> None:
-        self.run.start()
-        while not self.run.wait(POLL_SECONDS):
-            self._stop_if_cancelled()
+        self.run.start().wait()  # a cancel ends it, and its thread is not to outlive this one
         self._stop_if_cancelled()
         self.run.raise_error()
 

@@ -119,8 +119,9 @@ class SecondBlender:
     def _read(self) -> None:
         assert self._process.stdout is not None
         for line in self._process.stdout:
-            if line.startswith(PROGRESS):
+            is_progress = line.startswith(PROGRESS)
+            if is_progress and line.endswith("\n"):  # a kill may have cut the last one short
                 _, progress, self.status = line.rstrip().split(" ", 2)
                 self.progress = float(progress)
-            elif line.strip():
+            elif not is_progress and line.strip():
                 self._lines.append(line)
