@@ -14,8 +14,9 @@ const LARGE_PAGE: usize = 2 << 20;
 /// first.
 const MOST_KEPT: usize = 128 << 20;
 
-/// Shorter maps are not kept: there would be too many to look through.
-const LEAST_KEPT: usize = 64 << 10;
+/// Shorter maps are not kept, nor more than so many: there would be too many to look through.
+const LEAST_KEPT: usize = 4 << 10;
+const MOST_MAPS: usize = 64;
 
 /// A kept map is not given to who asks for less than a fourth of it.
 const MOST_SURPLUS: usize = 4;
@@ -54,12 +55,10 @@ pub fn give(map: MmapMut) {
     }
     let mut kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
     kept.push(map);
-    let mut sum: usize = kept.iter().map(|map| map.len()).sum();
-    let oldest = kept.iter().take_while(|map| {
-        let exceeds = sum > MOST_KEPT;
-        sum -= if exceeds { map.len() } else { 0 };
-        exceeds
-    });
-    let count = oldest.count();
-    kept.drain(..count);
+    let (mut sum, mut surplus) = (kept.iter().map(|map| map.len()).sum::<usize>(), 0);
+    while sum > MOST_KEPT || kept.len() - surplus > MOST_MAPS {
+        sum -= kept[surplus].len();
+        surplus += 1;
+    }
+    kept.drain(..surplus);
 }

@@ -1,9 +1,9 @@
 //! Which builder the hybrid uses: the one whose build, together with the rays to come, is expected to take least.
 //!
-//! Build times and the share of lazy cells that rays touch were fitted to 1e4 to 1e6 rays through bunny, dragon and
-//! Sponza, on one thread; as they are told in visits of a wide node, the constants that `calibrate` measures carry them
-//! over to other machines. Measured there, lazy cells pay up to some 3e4 rays on the dragon, where refining a cell when
-//! a ray comes takes longer than writing it with all others does, and up to 1e6 on the bunny.
+//! Build times were fitted to nine scenes of up to 871 thousand triangles, on one thread; as they are told in
+//! visits of a wide node, the constants that `calibrate` measures carry them over to other machines. The order by codes
+//! has become so cheap to write (bunny 5 ms, Sponza 18, dragon 84) that lazy cells (7, 30, 74) save little or nothing,
+//! and the first million rays then take 1.1 to 1.5 times as long: they pay for some thousand rays at most.
 
 use super::config::Config;
 
@@ -35,6 +35,8 @@ impl Builder {
 #[derive(Debug, Clone, Copy)]
 struct Profile {
     builder: Builder,
+    /// Judging nodes, where there are enough triangles for a grid.
+    judge: f64,
     /// Building, per triangle.
     build: f64,
     /// Refining, per triangle of a lazy cell that a ray touches.
@@ -44,10 +46,11 @@ struct Profile {
 }
 
 const PROFILES: [Profile; 4] = [
-    Profile { builder: Builder::Lazy, build: 10.0, refine: 20.0, trace: 1.1 },
-    Profile { builder: Builder::Linear, build: 15.0, refine: 0.0, trace: 1.2 },
-    Profile { builder: Builder::Clustered, build: 44.0, refine: 0.0, trace: 1.05 },
-    Profile { builder: Builder::Complete, build: 80.0, refine: 0.0, trace: 1.0 },
+    Profile { builder: Builder::Lazy, judge: 0.0, build: 7.5, refine: 20.0, trace: 1.1 },
+    Profile { builder: Builder::Linear, judge: 0.0, build: 8.0, refine: 0.0, trace: 1.2 },
+    Profile { builder: Builder::Clustered, judge: 0.0, build: 30.0, refine: 0.0, trace: 1.05 },
+    // The rays that judge its nodes are as many for a small mesh as for a large one.
+    Profile { builder: Builder::Complete, judge: 4e5, build: 85.0, refine: 0.0, trace: 1.0 },
 ];
 
 /// Triangles in a lazy cell, on average.
@@ -56,6 +59,9 @@ const CELL: f64 = 31.0;
 /// The share of cells that any number of rays touches, and how many cells a ray touches first while there are enough.
 const VISIBLE: f64 = 0.6;
 const TOUCHED: f64 = 0.2;
+
+/// A ray alone visits about as many nodes as the binary tree has levels; in a batch that takes this share of the time.
+const STREAMED: f64 = 0.5;
 
 /// A builder, and the nanoseconds it is expected to cost in all.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -71,10 +77,10 @@ pub fn estimates(triangles: usize, config: &Config) -> [Estimate; 4] {
     let (count, rays) = (triangles as f64, config.expected_rays);
     let seen = VISIBLE * (count / CELL).max(1.0);
     let touched = VISIBLE * (1.0 - (-rays * TOUCHED / seen).exp());
-    // A ray visits about as many nodes as the binary tree has levels.
-    let ray = (count + 2.0).log2();
-    let mut estimates = PROFILES.map(|Profile { builder, build, refine, trace }| {
-        let visits = count * (build + refine * touched) + rays * ray * trace;
+    let ray = STREAMED * (count + 2.0).log2();
+    let mut estimates = PROFILES.map(|Profile { builder, judge, build, refine, trace }| {
+        let judge = if triangles < config.grid_least_triangles { 0.0 } else { judge };
+        let visits = judge + count * (build + refine * touched) + rays * ray * trace;
         Estimate { builder, nanoseconds: visits * config.cost.node_ns }
     });
     estimates.sort_by(|a, b| a.nanoseconds.total_cmp(&b.nanoseconds));

@@ -6,6 +6,10 @@
 //! decides on the tree above large blocks, after Pantaleoni and Luebke, "HLBVH: Hierarchical LBVH Construction for
 //! Real-Time Ray Tracing of Dynamic Geometry", HPG 2010; within them, small blocks are cut and joined in the order of
 //! the curve. What is below is left to [`LazyCells`].
+//!
+//! Tried instead of the sort: one pass in the order of the mesh into 64 cells per axis, with their boxes, and a counting
+//! sort by cell. On the dragon, most of whose triangles are then in crowded cells, that took 95 ms instead of 74, and
+//! refining cells took a quarter longer, as each had to be sorted.
 
 use std::ops::Range;
 
