@@ -193,8 +193,9 @@ fn one_by_one(
     const PART: usize = 8192;
     let tracer = ours.tracer();
     pool::for_each(threads, hits.as_mut().parts(PART).enumerate(), &Job::new(), |(part, mut hits)| {
+        let mut walker = tracer.walker();
         for index in 0..hits.len() {
-            hits.set(index, tracer.first(&rays.get(part * PART + index))?);
+            hits.set(index, walker.first(&rays.get(part * PART + index))?);
         }
         Ok(())
     })

@@ -128,8 +128,13 @@ impl<'a> Rays<'a> {
     /// [`Error::Ray`] where [`Frame::new`](crate::traverse::frame::Frame::new) has none for it.
     #[inline(always)]
     pub(crate) fn frame(&self, index: usize, domain: &Domain) -> Result<Frame, Error> {
-        let ray = self.get(index);
-        Frame::new(&ray, domain).ok_or_else(|| ray.fault(self.first + index))
+        Frame::new(&self.get(index), domain).ok_or_else(|| self.fault(index))
+    }
+
+    /// Why ray `index` cannot be traced.
+    #[cold]
+    pub(crate) fn fault(&self, index: usize) -> Error {
+        self.get(index).fault(self.first + index)
     }
 
     /// Rays `index` to `index + 7`, by column: origin, direction, tmin, tmax.
@@ -157,13 +162,13 @@ impl<'a> Rays<'a> {
     }
 
     /// Gather ray `index`.
-    #[inline(always)]
+    #[inline]
     pub fn get(&self, index: usize) -> Ray {
         let index = self.first + index;
-        let gather = |columns: &[Column; 3]| Vec3::from_array(columns.map(|column| column.get(index)));
+        let ([ox, oy, oz], [dx, dy, dz]) = (&self.origin, &self.direction);
         Ray {
-            origin: gather(&self.origin),
-            direction: gather(&self.direction),
+            origin: Vec3::new(ox.get(index), oy.get(index), oz.get(index)),
+            direction: Vec3::new(dx.get(index), dy.get(index), dz.get(index)),
             tmin: self.tmin.get(index),
             tmax: self.tmax.get(index),
         }
@@ -171,6 +176,12 @@ impl<'a> Rays<'a> {
 }
 
 impl Ray {
+    /// Origin, direction, tmin, tmax.
+    pub(crate) fn to_row(self) -> [f32; 8] {
+        let ([ox, oy, oz], [dx, dy, dz]) = (self.origin.to_array(), self.direction.to_array());
+        [ox, oy, oz, dx, dy, dz, self.tmin, self.tmax]
+    }
+
     /// Why this ray cannot be traced, in words; `None` where it can.
     #[cold]
     pub fn fault(&self, index: usize) -> Error {

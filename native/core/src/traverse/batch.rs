@@ -6,17 +6,19 @@ use super::{
     frame::Frame,
     kernel::{self, Entry},
     pace::Pace,
-    probe::{Counts, Probe, Silent},
+    probe::{Counts, Probe},
+    single::One,
     stream::{Bin, Lists},
     tile::{Tile, Visit},
-    together::{Take, Together, in_ray_units},
+    together::{Take, Together},
+    waiting::{self, Waiting},
 };
 use crate::{
     Error, Job, Mesh,
     accel::structure::Structure,
     job::Phase,
-    pool,
-    ray::{Hit, HitsMut, Ray, Rays},
+    pool::{self, thread_count},
+    ray::{Hit, HitsMut, Rays},
     simd::{Kernel, Level, Simd},
 };
 
@@ -68,24 +70,15 @@ impl<'a> Tracer<'a> {
         self.with_room(|room| self.level.run(Singles { tracer: self, rays, take, room, probe: PhantomData }))
     }
 
-    /// The closest hit of one ray, on the calling thread: the cheapest way to ask for just one.
-    ///
-    /// # Errors
-    /// [`Error::Ray`] where the ray is unusable.
-    pub fn first(self, ray: &Ray) -> Result<Hit, Error> {
-        let frame = Frame::new(ray, &self.structure.domain).ok_or_else(|| ray.fault(0))?;
-        let hit = self.with_room(|room| self.level.run(One::<false> { tracer: self, frame: &frame, room }));
-        Ok(in_ray_units(&frame, hit))
-    }
-
     fn silent<T: Take + ?Sized, const ANY: bool>(self, rays: &Rays<'_>, to: &mut T, pace: &Pace) -> Result<(), Error> {
         self.with_room(|room| {
             if rays.len() >= LEAST_STREAM {
                 return self.level.run(Together::<_, ANY>::new(self, rays, to, room, pace));
             }
             for index in 0..rays.len() {
-                let frame = rays.frame(index, &self.structure.domain)?;
-                to.take(index, &frame, self.level.run(One::<ANY> { tracer: self, frame: &frame, room }));
+                let (ray, stack) = (rays.get(index), &mut room.stack);
+                let hit = self.level.run(One::<ANY> { tracer: self, ray: &ray, stack });
+                to.take(index, hit.ok_or_else(|| rays.fault(index))?);
             }
             Ok(())
         })
@@ -108,17 +101,11 @@ const LEAST_STREAM: usize = 64;
 #[derive(Default)]
 pub struct Room {
     pub stack: Vec<Entry>,
-    pub bins: [Bin; 8],
+    pub waiting: Waiting,
+    pub bin: Bin,
     pub lists: Lists,
     pub tile: Box<Tile>,
     pub visits: Vec<Visit>,
-}
-
-/// A ray that walks alone; the result is in the frame's units.
-struct One<'a, const ANY: bool> {
-    tracer: Tracer<'a>,
-    frame: &'a Frame,
-    room: &'a mut Room,
 }
 
 /// Rays that walk alone under the eyes of probes, and what to do with the index, frame, hit (in the frame's units) and
@@ -131,41 +118,15 @@ struct Singles<'a, F, P> {
     probe: PhantomData<P>,
 }
 
-/// The table that picks a loop's instance, once a batch.
-macro_rules! pick_instance {
-    ($batch:ident, $simd:ident) => {
-        match $batch.tracer.structure.has_grids() {
-            false => $batch.each::<S, false>($simd),
-            true => $batch.each::<S, true>($simd),
-        }
-    };
-}
-
-impl<const ANY: bool> Kernel for One<'_, ANY> {
-    type Output = Hit;
-
-    #[inline(always)]
-    fn run<S: Simd>(self, simd: S) -> Self::Output {
-        pick_instance!(self, simd)
-    }
-}
-
-impl<const ANY: bool> One<'_, ANY> {
-    #[inline(always)]
-    fn each<S: Simd, const GRIDS: bool>(self, simd: S) -> Hit {
-        let Tracer { structure, mesh, .. } = self.tracer;
-        let (frame, stack) = (self.frame, &mut self.room.stack);
-        kernel::trace::<S, Silent, GRIDS, ANY>(simd, structure, mesh, frame, stack, &mut Silent)
-            .answer::<ANY>(frame, mesh)
-    }
-}
-
 impl<F: FnMut(usize, &Frame, Hit, P), P: Probe + Default> Kernel for Singles<'_, F, P> {
     type Output = Result<(), Error>;
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> Self::Output {
-        pick_instance!(self, simd)
+        match self.tracer.structure.has_grids() {
+            false => self.each::<S, false>(simd),
+            true => self.each::<S, true>(simd),
+        }
     }
 }
 
@@ -177,14 +138,14 @@ impl<F: FnMut(usize, &Frame, Hit, P), P: Probe + Default> Singles<'_, F, P> {
             let frame = self.rays.frame(index, &structure.domain)?;
             let mut probe = P::default();
             let stack = &mut self.room.stack;
-            let best = kernel::trace::<S, P, GRIDS, false>(simd, structure, mesh, &frame, stack, &mut probe);
-            (self.take)(index, &frame, best.answer::<false>(&frame, mesh), probe);
+            let hit = kernel::trace::<S, P, GRIDS, false>(simd, structure, mesh, &frame, stack, &mut probe);
+            (self.take)(index, &frame, hit, probe);
         }
         Ok(())
     }
 }
 
-/// Rays between two looks at the job: a few milliseconds of work even on slow structures.
+/// The least rays between two looks at the job.
 const PART: usize = 1 << 13;
 
 impl Tracer<'_> {
@@ -193,9 +154,9 @@ impl Tracer<'_> {
     /// # Errors
     /// As there, and [`Error::Cancelled`].
     pub fn closest_parallel(self, rays: &Rays<'_>, hits: HitsMut<'_>, threads: usize, job: &Job) -> Result<(), Error> {
-        let pace = Pace::default();
+        let (pace, part) = (Pace::default(), self.part(rays, threads));
         let work = |rays: Rays<'_>, mut hits: HitsMut<'_>| self.silent::<_, false>(&rays, &mut hits, &pace);
-        self.parallel(rays, hits.parts(PART), threads, job, work)
+        parallel(rays, (part, hits.parts(part)), threads, job, work)
     }
 
     /// [`Tracer::occluded`] on several threads; 0 means all.
@@ -203,7 +164,8 @@ impl Tracer<'_> {
     /// # Errors
     /// As there, and [`Error::Cancelled`].
     pub fn occluded_parallel(self, rays: &Rays<'_>, out: &mut [bool], threads: usize, job: &Job) -> Result<(), Error> {
-        self.parallel(rays, out.chunks_mut(PART), threads, job, |rays, out| self.occluded(&rays, out))
+        let part = self.part(rays, threads);
+        parallel(rays, (part, out.chunks_mut(part)), threads, job, |rays, out| self.occluded(&rays, out))
     }
 
     /// [`Tracer::counted`] on several threads; 0 means all.
@@ -211,24 +173,31 @@ impl Tracer<'_> {
     /// # Errors
     /// As there, and [`Error::Cancelled`].
     pub fn counted_parallel(self, rays: &Rays<'_>, out: &mut [Counts], threads: usize, job: &Job) -> Result<(), Error> {
-        self.parallel(rays, out.chunks_mut(PART), threads, job, |rays, out| self.counted(&rays, out))
+        parallel(rays, (PART, out.chunks_mut(PART)), threads, job, |rays, out| self.counted(&rays, out))
     }
 
-    fn parallel<O: Send>(
-        self,
-        rays: &Rays<'_>,
-        parts: impl ExactSizeIterator<Item = O> + Send,
-        threads: usize,
-        job: &Job,
-        work: impl Fn(Rays<'_>, O) -> Result<(), Error> + Sync,
-    ) -> Result<(), Error> {
-        job.begin(Phase::Trace, rays.len() as u64);
-        pool::for_each(threads, parts.enumerate(), job, |(number, part)| {
-            let rays = rays.part(number * PART, PART);
-            let count = rays.len() as u64;
-            work(rays, part)?;
-            job.advance(count);
-            Ok(())
-        })
+    /// Rays between two looks at the job: as many as can wait for each other, but some parts for every thread, and a few
+    /// milliseconds of work where rays walk through grids alone.
+    fn part(self, rays: &Rays<'_>, threads: usize) -> usize {
+        let alone = self.structure.has_grids() && self.structure.lazy.is_empty();
+        let most = if alone { PART } else { waiting::MOST };
+        if rays.len() <= PART { PART } else { rays.len().div_ceil(4 * thread_count(threads)).clamp(PART, most) }
     }
+}
+
+fn parallel<O: Send>(
+    rays: &Rays<'_>,
+    (size, parts): (usize, impl ExactSizeIterator<Item = O> + Send),
+    threads: usize,
+    job: &Job,
+    work: impl Fn(Rays<'_>, O) -> Result<(), Error> + Sync,
+) -> Result<(), Error> {
+    job.begin(Phase::Trace, rays.len() as u64);
+    pool::for_each(threads, parts.enumerate(), job, |(number, part)| {
+        let rays = rays.part(number * size, size);
+        let count = rays.len() as u64;
+        work(rays, part)?;
+        job.advance(count);
+        Ok(())
+    })
 }

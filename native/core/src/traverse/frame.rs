@@ -16,7 +16,10 @@
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
 
-use crate::{bounds::Bounds, ray::Ray};
+use crate::{
+    bounds::Bounds,
+    ray::{Hit, MISS, Ray},
+};
 
 /// Origins beyond this many half extents from the scene's centre are brought near.
 pub const NEAR: f32 = 4.0;
@@ -177,6 +180,12 @@ impl Frame {
     #[inline]
     pub fn octant(&self) -> usize {
         (0..3).fold(0, |octant, k| octant | usize::from(self.inverse[k] < 0.0) << k)
+    }
+
+    /// A hit in the frame's units as one in the ray's own.
+    #[inline(always)]
+    pub fn in_ray_units(&self, hit: Hit) -> Hit {
+        if hit.primitive == MISS { Hit::MISS } else { Hit { t: self.parameter(hit.t), ..hit } }
     }
 
     /// A parameter of the frame in lengths of the ray's own direction, from its own origin.

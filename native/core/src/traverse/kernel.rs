@@ -11,6 +11,7 @@ use super::{
 use crate::{
     Mesh,
     accel::structure::{Node, NodeRef, Structure, Target, View},
+    ray::Hit,
     simd::Simd,
     triangle::LANES,
 };
@@ -30,6 +31,7 @@ impl Entry {
 /// A frame's constants in vectors, ready for node tests.
 struct Planes<S: Simd> {
     near: [usize; 3],
+    far: [usize; 3],
     inverse: [S::F32; 3],
     near_bias: [S::F32; 3],
     far_bias: [S::F32; 3],
@@ -41,11 +43,18 @@ fn splat<S: Simd>(simd: S, [x, y, z]: [f32; 3]) -> [S::F32; 3] {
     [simd.splat(x), simd.splat(y), simd.splat(z)]
 }
 
+/// Which of a node's planes a ray meets first along an axis.
+#[inline(always)]
+fn side(frame: &Frame, axis: usize) -> usize {
+    axis + 3 * usize::from(frame.inverse[axis] < 0.0)
+}
+
 impl<S: Simd> Planes<S> {
     #[inline(always)]
     fn new(simd: S, frame: &Frame) -> Self {
         Self {
-            near: std::array::from_fn(|k| if frame.inverse[k] < 0.0 { k + 3 } else { k }),
+            near: [side(frame, 0), side(frame, 1), side(frame, 2)],
+            far: [3 - side(frame, 0), 5 - side(frame, 1), 7 - side(frame, 2)],
             inverse: splat(simd, frame.inverse),
             near_bias: splat(simd, frame.near_bias),
             far_bias: splat(simd, frame.far_bias),
@@ -59,7 +68,7 @@ impl<S: Simd> Planes<S> {
         let (mut near, mut far) = (self.tmin, simd.splat(limit));
         for k in 0..3 {
             let first = simd.load(&node.plane[self.near[k]]);
-            let last = simd.load(&node.plane[(self.near[k] + 3) % 6]);
+            let last = simd.load(&node.plane[self.far[k]]);
             near = simd.max(simd.mul_add(first, self.inverse[k], self.near_bias[k]), near);
             far = simd.min(simd.mul_add(last, self.inverse[k], self.far_bias[k]), far);
         }
@@ -67,7 +76,7 @@ impl<S: Simd> Planes<S> {
     }
 }
 
-/// The first hit along the ray, or, where `ANY`, some hit. `GRIDS` tells that the structure has grids.
+/// The first hit along the ray in the frame's units, or, where `ANY`, some hit. `GRIDS` tells that the structure has grids.
 #[inline(always)]
 pub fn trace<S: Simd, P: Probe, const GRIDS: bool, const ANY: bool>(
     simd: S,
@@ -76,10 +85,10 @@ pub fn trace<S: Simd, P: Probe, const GRIDS: bool, const ANY: bool>(
     frame: &Frame,
     stack: &mut [Entry],
     probe: &mut P,
-) -> Best {
+) -> Hit {
     let mut search = Search { simd, frame, mesh, probe, best: Best::none(frame.tmax) };
     trace_below::<S, P, GRIDS, ANY>(&mut search, structure, (structure.view(), structure.root), stack);
-    search.best
+    search.best.answer::<ANY>(frame, mesh)
 }
 
 /// Go on with a search below a node, which is one of those that `view` shows.
@@ -143,27 +152,28 @@ pub fn trace_below<S: Simd, P: Probe, const GRIDS: bool, const ANY: bool>(
     }
 }
 
-/// The nearest of the children met; the others go to the stack.
+/// The nearest of the children met; the others go to the stack, the farthest first.
 #[inline(always)]
 fn descend(node: &Node, met: u32, near: &[f32; LANES], stack: &mut [Entry], depth: &mut usize) -> NodeRef {
     let entry = |lane: usize| Entry { near: near[lane & 7], node: node.child[lane & 7] };
     let mut rest = met & (met - 1);
     let mut nearest = entry(met.trailing_zeros() as usize);
+    let base = *depth;
     while rest != 0 {
         let mut other = entry(rest.trailing_zeros() as usize);
         rest &= rest - 1;
         if other.near < nearest.near {
             std::mem::swap(&mut other, &mut nearest);
         }
-        push(stack, depth, other);
+        let mut place = *depth;
+        while place > base && stack[place - 1].near < other.near {
+            stack[place] = stack[place - 1];
+            place -= 1;
+        }
+        stack[place] = other;
+        *depth += 1;
     }
     nearest.node
-}
-
-#[inline(always)]
-fn push(stack: &mut [Entry], depth: &mut usize, entry: Entry) {
-    stack[*depth] = entry;
-    *depth += 1;
 }
 
 /// The last entry from `floor` up that the ray still reaches before `limit`.

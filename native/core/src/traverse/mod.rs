@@ -14,9 +14,12 @@ mod nest;
 mod pace;
 pub mod probe;
 mod setup;
+mod single;
 mod stream;
 mod tetrahedra;
 mod tile;
 mod together;
+mod waiting;
 
 pub use batch::Tracer;
+pub use single::Walker;

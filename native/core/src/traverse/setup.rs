@@ -1,27 +1,26 @@
 //! Eight frames at once: [`Frame::new`] in vectors, operation by operation, so that both give the same bits.
 
 use super::frame::{DILATION, Domain, Frame, NEAR, PARALLEL};
-use crate::{ray::Rays, simd::Simd, triangle::LANES};
+use crate::{simd::Simd, triangle::LANES};
 
-/// The frames of rays `first` to `first + 7`, which the batch must have. False where one of them is unusable or begins
-/// far away; then `frames` is unspecified, and [`Frame::new`] is to be asked for each.
+/// The frames of eight rays, given by column: origin, direction, tmin, tmax. False where one of them is unusable or
+/// begins far away; then `frames` is unspecified, and [`Frame::new`] is to be asked for each.
 #[inline(always)]
-pub fn eight<S: Simd>(simd: S, rays: &Rays<'_>, first: usize, domain: &Domain, frames: &mut [Frame; LANES]) -> bool {
-    let columns = rays.eight(first);
+pub fn eight<S: Simd>(simd: S, columns: &[S::F32; 8], domain: &Domain, frames: &mut [Frame; LANES]) -> bool {
     let zero = simd.splat(0.0);
     let [mut origin, mut direction, mut local, mut to_centre] = [[zero; 3]; 4];
     let (mut finite, mut largest, mut reach) = (zero, zero, zero);
     for k in 0..3 {
         let centre = simd.splat(domain.centre[k]);
-        origin[k] = simd.load(&columns[k]);
-        direction[k] = simd.load(&columns[3 + k]);
+        origin[k] = columns[k];
+        direction[k] = columns[3 + k];
         local[k] = simd.sub(origin[k], centre);
         to_centre[k] = simd.sub(centre, origin[k]);
         finite = simd.add(finite, simd.add(simd.mul(origin[k], zero), simd.mul(direction[k], zero)));
         largest = simd.max(absolute(simd, direction[k]), largest);
         reach = simd.max(absolute(simd, local[k]), reach);
     }
-    let (tmin, tmax) = (simd.load(&columns[6]), simd.load(&columns[7]));
+    let [.., tmin, tmax] = *columns;
     let sound = simd.le(finite, zero)
         & simd.le(simd.splat(1e-37), largest)
         & simd.le(largest, simd.splat(1e38))
@@ -90,7 +89,7 @@ fn shear<S: Simd>(simd: S, direction: [S::F32; 3], inverse: [S::F32; 3]) -> ([S:
 mod tests {
     use super::*;
     use crate::{
-        ray::Column,
+        ray::{Column, Rays},
         simd::{Kernel, Level},
     };
     use bytemuck::Zeroable;
@@ -103,7 +102,8 @@ mod tests {
         #[inline(always)]
         fn run<S: Simd>(self, simd: S) -> Self::Output {
             let mut frames = [Frame::zeroed(); LANES];
-            eight(simd, self.0, 0, self.1, &mut frames).then_some(frames)
+            let columns = self.0.eight(0).map(|column| simd.load(&column));
+            eight(simd, &columns, self.1, &mut frames).then_some(frames)
         }
     }
 

@@ -6,14 +6,20 @@
 //! Every ray keeps its own interval, boxes and triangles are tested by the arithmetic of the single ray, and the first
 //! hit in the order of [`Hit::precedes`] does not depend on the order of tests: results equal the single ray's.
 
+use std::ops::Range;
+
+use bytemuck::Zeroable;
+
 use super::{
-    frame::Frame,
+    frame::{Domain, Frame},
     kernel,
     leaf::{Best, Search},
     probe::Silent,
+    setup,
+    waiting::Waiting,
 };
 use crate::{
-    Mesh,
+    Error, Mesh,
     accel::structure::{Node, NodeRef, Structure, Target, View},
     ray::MISS,
     simd::{MOST_GROUP, Simd},
@@ -28,64 +34,69 @@ pub const BIN: usize = 1024;
 /// bunny and by up to 8% on the dragon, where waiting rays give the next nodes time to arrive.
 const FEW: usize = 2;
 
-/// Rays of one octant, waiting to be traced.
+/// Rays of one octant.
 #[derive(Debug, Default)]
 pub struct Bin {
     frames: Vec<Frame>,
     hits: Vec<Best>,
-    indices: Vec<u32>,
+    places: Range<usize>,
 }
 
 impl Bin {
-    /// Add a ray of the batch.
+    /// Take the rays of some places in the order of those that wait, at most [`BIN`].
+    ///
+    /// # Errors
+    /// [`Error::Ray`] for an unusable ray.
     #[inline(always)]
-    pub fn push(&mut self, index: usize, frame: &Frame) {
-        self.hits.push(Best::none(frame.tmax));
-        self.frames.push(*frame);
-        self.indices.push(index as u32);
-    }
-
-    /// Whether no more rays fit.
-    #[inline(always)]
-    pub fn is_full(&self) -> bool {
-        self.frames.len() >= BIN
+    pub fn fill<S: Simd>(
+        &mut self,
+        simd: S,
+        waiting: &Waiting,
+        places: Range<usize>,
+        domain: &Domain,
+    ) -> Result<(), Error> {
+        self.frames.resize(BIN, Frame::zeroed());
+        self.hits.clear();
+        let (groups, _) = self.frames.as_chunks_mut();
+        for (first, frames) in places.clone().step_by(LANES).zip(groups) {
+            waiting.warm(simd, first + 2 * LANES);
+            if !setup::eight(simd, &waiting.eight(simd, first..places.end), domain, frames) {
+                for (place, frame) in (first..places.end).zip(&mut *frames) {
+                    *frame = waiting.frame(place, domain)?;
+                }
+            }
+            for frame in frames {
+                self.hits.push(Best::none(frame.tmax));
+            }
+        }
+        self.places = places;
+        Ok(())
     }
 
     /// How many rays there are.
     #[inline(always)]
     pub fn len(&self) -> usize {
-        self.frames.len()
+        self.places.len()
     }
 
-    /// Whether there is none.
-    #[inline(always)]
-    pub fn is_empty(&self) -> bool {
-        self.frames.is_empty()
-    }
-
-    /// Batch index, frame and first hit of a ray.
+    /// Place, frame and first hit of a ray.
     #[inline(always)]
     pub fn ray(&self, slot: usize) -> (usize, &Frame, Best) {
-        (self.indices[slot] as usize, &self.frames[slot], self.hits[slot])
+        (self.places.start + slot, &self.frames[slot], self.hits[slot])
     }
 
     /// Ask for the triangles that were hit, so that they are near when their hits are evaluated.
     #[inline(always)]
     pub fn warm<S: Simd>(&self, simd: S, mesh: &Mesh) {
-        for best in self.hits.iter().filter(|best| best.primitive != MISS) {
-            simd.prefetch(&mesh.triangles()[best.primitive as usize]);
+        let (triangles, vertices) = (mesh.triangles(), mesh.vertices());
+        let hits = self.hits[..self.len()].iter().filter(|best| best.primitive != MISS);
+        for best in hits.clone() {
+            simd.prefetch(&triangles[best.primitive as usize]);
         }
-        for best in self.hits.iter().filter(|best| best.primitive != MISS) {
-            let [corner, ..] = mesh.triangles()[best.primitive as usize];
-            simd.prefetch(&mesh.vertices()[corner as usize]);
+        for best in hits {
+            let [corner, ..] = triangles[best.primitive as usize];
+            simd.prefetch(&vertices[corner as usize]);
         }
-    }
-
-    /// Forget all rays.
-    pub fn clear(&mut self) {
-        self.frames.clear();
-        self.hits.clear();
-        self.indices.clear();
     }
 }
 
@@ -116,7 +127,7 @@ pub fn trace<S: Simd, const GRIDS: bool, const ANY: bool>(
     lists: &mut Lists,
     stack: &mut [kernel::Entry],
 ) {
-    lists.begin(structure.root, bin.frames.len());
+    lists.begin(structure.root, bin.len());
     // Visits from `floor` up are in the lazy cell that the rays are in.
     let (mut here, mut floor) = (structure.view(), 0);
     loop {
@@ -177,7 +188,7 @@ fn branch<S: Simd>(
     here: View<'_>,
     index: usize,
     octant: usize,
-    ids: std::ops::Range<usize>,
+    ids: Range<usize>,
     frames: &[Frame],
     lists: &mut Lists,
 ) {

@@ -1,15 +1,12 @@
-//! Batches whose rays walk together: eight by eight into streams, or, where they start at one point, into tiles.
-
-use bytemuck::Zeroable;
+//! Batches whose rays walk together: in streams, sorted by the grid over the rays, or, where they start at one point,
+//! in tiles.
 
 use super::{
     Tracer,
     answers::Answers,
     batch::Room,
-    frame::Frame,
     pace::{Pace, Trial},
-    setup,
-    stream::{self, Bin},
+    stream::{self, BIN},
     tile,
 };
 use crate::{
@@ -21,16 +18,16 @@ use crate::{
 
 /// What answers are written to.
 pub trait Take {
-    /// The hit of a ray, in its frame's units.
-    fn take(&mut self, index: usize, frame: &Frame, hit: Hit);
-    /// The hits of rays `index` to `index + 7`, in their own units.
+    /// The hit of a ray.
+    fn take(&mut self, index: usize, hit: Hit);
+    /// The hits of rays `index` to `index + 7`.
     fn take_eight(&mut self, index: usize, hits: &Eight);
 }
 
 impl Take for HitsMut<'_> {
     #[inline(always)]
-    fn take(&mut self, index: usize, frame: &Frame, hit: Hit) {
-        self.set(index, in_ray_units(frame, hit));
+    fn take(&mut self, index: usize, hit: Hit) {
+        self.set(index, hit);
     }
     #[inline(always)]
     fn take_eight(&mut self, index: usize, hits: &Eight) {
@@ -40,7 +37,7 @@ impl Take for HitsMut<'_> {
 
 impl Take for [bool] {
     #[inline(always)]
-    fn take(&mut self, index: usize, _: &Frame, hit: Hit) {
+    fn take(&mut self, index: usize, hit: Hit) {
         self[index] = hit.primitive != MISS;
     }
     #[inline(always)]
@@ -49,11 +46,6 @@ impl Take for [bool] {
             self[index + lane] = hits.primitive[lane] != MISS;
         }
     }
-}
-
-#[inline(always)]
-pub fn in_ray_units(frame: &Frame, hit: Hit) -> Hit {
-    if hit.primitive == MISS { Hit::MISS } else { Hit { t: frame.parameter(hit.t), ..hit } }
 }
 
 /// After rays of one origin that make no tile, tiles are not tried for so many.
@@ -68,8 +60,6 @@ pub struct Together<'a, T: ?Sized, const ANY: bool> {
     trial: Trial<'a>,
     /// Before this ray no tile is tried.
     ripe: usize,
-    /// Whether all bins are being traced, for a measurement.
-    emptying: bool,
 }
 
 impl<T: Take + ?Sized, const ANY: bool> Kernel for Together<'_, T, ANY> {
@@ -87,63 +77,43 @@ impl<T: Take + ?Sized, const ANY: bool> Kernel for Together<'_, T, ANY> {
 impl<'a, T: Take + ?Sized, const ANY: bool> Together<'a, T, ANY> {
     /// The batch as a kernel; what it learns about its rays goes to `pace`.
     pub fn new(tracer: Tracer<'a>, rays: &'a Rays<'a>, to: &'a mut T, room: &'a mut Room, pace: &'a Pace) -> Self {
-        Self { tracer, rays, to, room, trial: Trial::new(pace), ripe: 0, emptying: false }
+        Self { tracer, rays, to, room, trial: Trial::new(pace), ripe: 0 }
     }
 
     #[inline(always)]
     fn each<S: Simd, const GRIDS: bool>(mut self, simd: S) -> Result<(), Error> {
-        let Tracer { structure, mesh, .. } = self.tracer;
-        self.room.bins.iter_mut().for_each(Bin::clear);
+        self.room.waiting.begin(self.rays.len());
         let mut next = 0;
-        while let Some(octant) = self.fill::<S, GRIDS>(simd, &mut next)? {
-            let Room { stack, bins, lists, .. } = &mut *self.room;
-            stream::trace::<S, GRIDS, ANY>(simd, structure, mesh, octant, &mut bins[octant], lists, stack);
-            self.answer(simd, octant);
-            self.room.bins[octant].clear();
+        while next < self.rays.len() {
+            let mut taken = if ANY || next < self.ripe { 0 } else { self.tile::<S, GRIDS>(simd, next) };
+            if taken == 0 {
+                taken = self.room.waiting.add(simd, self.rays, next, &self.tracer.structure.domain)?;
+            }
+            next += taken;
+            let measured = !ANY && self.trial.took(taken);
+            if measured || self.room.waiting.is_full() || next == self.rays.len() {
+                self.streams::<S, GRIDS>(simd)?;
+                self.trial.emptied();
+            }
         }
         Ok(())
     }
 
-    /// Take rays from `next` on, in tiles or into bins, until a bin is to be traced, and tell which.
+    /// Trace all rays that wait.
     #[inline(always)]
-    fn fill<S: Simd, const GRIDS: bool>(&mut self, simd: S, next: &mut usize) -> Result<Option<usize>, Error> {
-        let mut full = self.room.bins.iter().position(Bin::is_full);
-        loop {
-            while full.is_none() && !self.emptying && *next < self.rays.len() {
-                let mut taken = if ANY || *next < self.ripe { 0 } else { self.tile::<S, GRIDS>(simd, *next) };
-                if taken == 0 {
-                    (taken, full) = self.scatter(simd, *next)?;
-                }
-                *next += taken;
-                self.emptying = !ANY && self.trial.took(taken);
-            }
-            let found = full.or_else(|| self.room.bins.iter().position(|bin| !bin.is_empty()));
-            if found.is_some() {
-                return Ok(found);
-            }
-            self.emptying = false;
-            self.trial.emptied();
-            if *next >= self.rays.len() {
-                return Ok(None);
+    fn streams<S: Simd, const GRIDS: bool>(&mut self, simd: S) -> Result<(), Error> {
+        let Tracer { structure, mesh, .. } = self.tracer;
+        let octants = self.room.waiting.sort();
+        for (octant, places) in octants.into_iter().enumerate() {
+            for first in places.clone().step_by(BIN) {
+                let Room { stack, bin, lists, waiting, .. } = &mut *self.room;
+                bin.fill(simd, waiting, first..places.end.min(first + BIN), &structure.domain)?;
+                stream::trace::<S, GRIDS, ANY>(simd, structure, mesh, octant, bin, lists, stack);
+                self.answer(simd);
             }
         }
-    }
-
-    /// Put eight rays, or the batch's last ones, into bins; returns how many, and which bin is full.
-    #[inline(always)]
-    fn scatter<S: Simd>(&mut self, simd: S, first: usize) -> Result<(usize, Option<usize>), Error> {
-        let mut frames = [Frame::zeroed(); LANES];
-        let lanes = LANES.min(self.rays.len() - first);
-        self.frames(simd, first, &mut frames[..lanes])?;
-        let mut full = None;
-        for lane in 0..lanes {
-            let octant = frames[lane].octant();
-            self.room.bins[octant].push(first + lane, &frames[lane]);
-            if self.room.bins[octant].is_full() {
-                full = Some(octant);
-            }
-        }
-        Ok((lanes, full))
+        self.room.waiting.begin(0);
+        Ok(())
     }
 
     /// Trace a tile of the rays from `first` on; returns how many it holds, 0 where it is no tile's turn or they make
@@ -169,34 +139,19 @@ impl<'a, T: Take + ?Sized, const ANY: bool> Together<'a, T, ANY> {
         taken
     }
 
-    /// The frames of the rays from `first` on.
-    #[inline(always)]
-    fn frames<S: Simd>(&self, simd: S, first: usize, frames: &mut [Frame]) -> Result<(), Error> {
-        let domain = &self.tracer.structure.domain;
-        if let Some(eight) = frames.first_chunk_mut()
-            && setup::eight(simd, self.rays, first, domain, eight)
-        {
-            return Ok(());
-        }
-        for (lane, frame) in frames.iter_mut().enumerate() {
-            *frame = self.rays.frame(first + lane, domain)?;
-        }
-        Ok(())
-    }
-
     /// Tell what the rays of a bin hit.
     #[inline(always)]
-    fn answer<S: Simd>(&mut self, simd: S, octant: usize) {
-        let bin = &self.room.bins[octant];
+    fn answer<S: Simd>(&mut self, simd: S) {
+        let Room { bin, waiting, .. } = &*self.room;
         if !ANY {
             bin.warm(simd, self.tracer.mesh);
         }
         let (mut answers, mut slot) = (Answers::EMPTY, 0);
         while slot < bin.len() {
             while slot < bin.len() && !answers.is_full() {
-                let (index, frame, best) = bin.ray(slot);
+                let (place, frame, best) = bin.ray(slot);
                 if ANY || best.primitive == MISS {
-                    self.to.take(index, frame, Hit { primitive: best.primitive, ..Hit::MISS });
+                    self.to.take(waiting.index(place), Hit { primitive: best.primitive, ..Hit::MISS });
                 } else {
                     answers.push(slot, frame, self.tracer.mesh, best.primitive);
                 }
@@ -207,8 +162,8 @@ impl<'a, T: Take + ?Sized, const ANY: bool> Together<'a, T, ANY> {
             }
             let (hits, count) = answers.take(simd);
             for &(slot, hit) in &hits[..count] {
-                let (index, frame, _) = bin.ray(slot);
-                self.to.take(index, frame, hit);
+                let (place, frame, _) = bin.ray(slot);
+                self.to.take(waiting.index(place), frame.in_ray_units(hit));
             }
         }
     }

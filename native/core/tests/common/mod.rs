@@ -205,7 +205,11 @@ impl Walk {
         for hits in [self.hits(&accelerator, rays, 0, rays.len())].into_iter().chain(alone) {
             for (index, hit, blocked) in hits {
                 assert_eq!(hit, expected.get(index), "ray {index}, {:?}, {self:?}", rays.ray(index));
-                assert_eq!(accelerator.tracer().first(&rays.ray(index)).unwrap(), hit, "ray {index}, {self:?}");
+                assert_eq!(
+                    accelerator.tracer().walker().first(&rays.ray(index)).unwrap(),
+                    hit,
+                    "ray {index}, {self:?}"
+                );
                 assert_eq!(blocked, hit.primitive != MISS, "any hit, ray {index}, {:?}, {self:?}", rays.ray(index));
             }
         }
