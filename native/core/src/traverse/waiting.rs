@@ -15,7 +15,11 @@ use crate::{
     triangle::LANES,
 };
 
-/// The most rays that wait: their numbers fit into 16 bits.
+/// The most rays that wait: their numbers fit into 16 bits. Of 8 to 64 thousand, with AVX2 and rays in the order of
+/// pixels, none was the fastest everywhere, and 64 thousand cost up to 15% (ambient occlusion on the dragon).
+///
+/// Against bins of an octant in the order in which rays came, half a million bounces from random triangles took 1/1.20
+/// of the time on the dragon and 1/1.14 on the soup. Rays in the order of pixels gain nothing from the cells.
 pub const MOST: usize = 1 << 14;
 
 /// Room that [`Waiting::add`] needs: up to eight rays, and eight places written for each.
