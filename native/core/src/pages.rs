@@ -10,8 +10,8 @@ use memmap2::MmapMut;
 /// to what is.
 const LARGE_PAGE: usize = 2 << 20;
 
-/// Most bytes that are kept for the next who asks: what a mesh of a million triangles, its structure and its builder need. Old maps go
-/// first.
+/// Most bytes that are kept for the next who asks: what a mesh of a million triangles, its structure and its builder
+/// need. Old maps go first.
 const MOST_KEPT: usize = 128 << 20;
 
 /// Shorter maps are not kept, nor more than so many: there would be too many to look through.
@@ -32,7 +32,11 @@ pub fn take(bytes: usize) -> std::io::Result<(MmapMut, bool)> {
     if let Some(map) = kept(length) {
         return Ok((map, false));
     }
-    let map = MmapMut::map_anon(length)?;
+    let map = MmapMut::map_anon(length).or_else(|_| {
+        // What is kept may be what is missing.
+        forget();
+        MmapMut::map_anon(length)
+    })?;
     // Only a hint: a system without large pages serves small ones.
     #[cfg(target_os = "linux")]
     let _ = map.advise(memmap2::Advice::HugePage);
@@ -46,6 +50,11 @@ fn kept(length: usize) -> Option<MmapMut> {
     let fitting = kept.iter().enumerate().filter(|(_, map)| fits(map));
     let (index, _) = fitting.min_by_key(|(_, map)| map.len())?;
     Some(kept.remove(index))
+}
+
+/// Give all that is kept back to the system.
+fn forget() {
+    KEPT.lock().unwrap_or_else(PoisonError::into_inner).clear();
 }
 
 /// Take a map back.

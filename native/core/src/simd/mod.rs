@@ -54,6 +54,11 @@ pub trait Simd: Copy + Send + Sync + 'static {
     fn if_ge(self, a: Self::F32, b: Self::F32, first: Self::F32, second: Self::F32) -> Self::F32;
     /// Rows to columns.
     fn transpose(self, rows: [Self::F32; 8]) -> [Self::F32; 8];
+    /// The magnitude of each.
+    #[inline(always)]
+    fn abs(self, value: Self::F32) -> Self::F32 {
+        self.and(value, self.splat(f32::from_bits(i32::MAX as u32)))
+    }
     /// a - b
     fn sub(self, a: Self::F32, b: Self::F32) -> Self::F32;
     /// a * b

@@ -86,7 +86,7 @@ impl<S: Simd> Sheared<S> {
         let reciprocal = simd.div(simd.splat(1.0), sum);
         let steepness = simd.splat(frame.inverse[frame.axes[2] as usize]);
         let t = simd.mul(simd.mul(weighted, reciprocal), steepness);
-        let share = simd.mul(simd.mul(error, simd.splat(8.0)), absolute(simd, reciprocal));
+        let share = simd.mul(simd.mul(error, simd.splat(8.0)), simd.abs(reciprocal));
         let reach = simd.max(greatest(simd, self.depth), simd.splat(LEAST_DEPTH));
         let doubt = simd.mul(reach, simd.add(share, simd.splat(DEPTH_ERROR)));
         let (low, high) = (simd.sub(t, doubt), simd.add(t, doubt));
@@ -129,13 +129,8 @@ fn edge<S: Simd>(simd: S, p: [S::F32; 3], q: [S::F32; 3]) -> (S::F32, S::F32) {
     (simd.sub(simd.mul(p[0], q[1]), product), product)
 }
 
-#[inline(always)]
-fn absolute<S: Simd>(simd: S, value: S::F32) -> S::F32 {
-    simd.and(value, simd.splat(f32::from_bits(i32::MAX as u32)))
-}
-
 /// The greatest magnitude of three.
 #[inline(always)]
 fn greatest<S: Simd>(simd: S, [a, b, c]: [S::F32; 3]) -> S::F32 {
-    simd.max(simd.max(absolute(simd, a), absolute(simd, b)), absolute(simd, c))
+    simd.max(simd.max(simd.abs(a), simd.abs(b)), simd.abs(c))
 }

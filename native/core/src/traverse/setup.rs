@@ -17,8 +17,8 @@ pub fn eight<S: Simd>(simd: S, columns: &[S::F32; 8], domain: &Domain, frames: &
         local[k] = simd.sub(origin[k], centre);
         to_centre[k] = simd.sub(centre, origin[k]);
         finite = simd.add(finite, simd.add(simd.mul(origin[k], zero), simd.mul(direction[k], zero)));
-        largest = simd.max(absolute(simd, direction[k]), largest);
-        reach = simd.max(absolute(simd, local[k]), reach);
+        largest = simd.max(simd.abs(direction[k]), largest);
+        reach = simd.max(simd.abs(local[k]), reach);
     }
     let [.., tmin, tmax] = *columns;
     let sound = simd.le(finite, zero)
@@ -38,10 +38,10 @@ pub fn eight<S: Simd>(simd: S, columns: &[S::F32; 8], domain: &Domain, frames: &
     for k in 0..3 {
         direction[k] = simd.mul(direction[k], scale);
         let sign = simd.and(direction[k], simd.splat(-0.0));
-        let steep = simd.max(absolute(simd, direction[k]), simd.splat(PARALLEL));
+        let steep = simd.max(simd.abs(direction[k]), simd.splat(PARALLEL));
         inverse[k] = simd.div(simd.splat(1.0), simd.or(steep, sign));
         let bias = simd.mul(to_centre[k], inverse[k]);
-        let slack = simd.mul(absolute(simd, inverse[k]), margin);
+        let slack = simd.mul(simd.abs(inverse[k]), margin);
         near_bias[k] = simd.sub(bias, slack);
         far_bias[k] = simd.add(bias, slack);
     }
@@ -63,16 +63,11 @@ pub fn eight<S: Simd>(simd: S, columns: &[S::F32; 8], domain: &Domain, frames: &
     true
 }
 
-#[inline(always)]
-fn absolute<S: Simd>(simd: S, value: S::F32) -> S::F32 {
-    simd.and(value, simd.splat(f32::from_bits(i32::MAX as u32)))
-}
-
 /// The axes of the sheared space, as bits, and the direction over its dominant component.
 #[inline(always)]
 fn shear<S: Simd>(simd: S, direction: [S::F32; 3], inverse: [S::F32; 3]) -> ([S::F32; 3], [S::F32; 2]) {
     let [x, y, z] = direction;
-    let size = [absolute(simd, x), absolute(simd, y), absolute(simd, z)];
+    let size = [simd.abs(x), simd.abs(y), simd.abs(z)];
     let greatest = simd.max(simd.max(size[1], size[2]), size[0]);
     let axis = [0, 1, 2].map(f32::from_bits).map(|bits| simd.splat(bits));
     let choose = |of_x, of_y, of_z| {

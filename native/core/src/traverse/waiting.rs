@@ -190,16 +190,11 @@ fn usable<S: Simd>(simd: S, columns: &[S::F32; 8]) -> bool {
         finite = simd.add(finite, simd.mul(columns[k], zero));
     }
     for k in 3..6 {
-        largest = simd.max(absolute(simd, columns[k]), largest);
+        largest = simd.max(simd.abs(columns[k]), largest);
     }
     let [.., tmin, tmax] = *columns;
     let ordered = simd.le(tmin, tmax) | simd.le(tmax, tmin);
     simd.le(finite, zero) & simd.le(simd.splat(1e-37), largest) & ordered == 0xff
-}
-
-#[inline(always)]
-fn absolute<S: Simd>(simd: S, value: S::F32) -> S::F32 {
-    simd.and(value, simd.splat(f32::from_bits(i32::MAX as u32)))
 }
 
 /// Octant and cell of eight rays: the signs of the direction, then the cell's place on the Morton curve.

@@ -1,9 +1,6 @@
 //! Blocks of triangles against groups of rays.
 
-use super::{
-    ROUNDING,
-    rays::{Tile, absolute},
-};
+use super::{ROUNDING, rays::Tile};
 use crate::{
     Mesh,
     simd::Simd,
@@ -51,7 +48,7 @@ impl Planes {
         let area = simd.mul(extent, reach);
         let blur = simd.mul_add(simd.mul(extent, area), simd.splat(tile.slack.blur), tiny);
         let doubt = simd.mul_add(area, simd.splat(tile.slack.doubt), tiny);
-        let volume = absolute(simd, volume);
+        let volume = simd.abs(volume);
         self.doubt = simd.store(simd.if_ge(volume, blur, doubt, simd.splat(f32::INFINITY)));
         self.blur = simd.store(blur);
         self.volume = simd.store(volume);
@@ -97,8 +94,8 @@ impl Planes {
         for edge in &self.edge {
             let [x, y, z] = [simd.load(&edge[0]), simd.load(&edge[1]), simd.load(&edge[2])];
             let most = simd.mul_add(x, middle[0], simd.mul_add(y, middle[1], z));
-            let most = simd.mul_add(absolute(simd, x), half[0], most);
-            let most = simd.mul_add(absolute(simd, y), half[1], most);
+            let most = simd.mul_add(simd.abs(x), half[0], most);
+            let most = simd.mul_add(simd.abs(y), half[1], most);
             least = simd.min(most, least);
         }
         simd.le(simd.splat(0.0), simd.add(least, simd.load(&self.doubt)))
@@ -190,7 +187,7 @@ fn dot<S: Simd>(simd: S, p: Vector<S>, q: Vector<S>) -> S::F32 {
 
 #[inline(always)]
 fn largest<S: Simd>(simd: S, v: Vector<S>) -> S::F32 {
-    simd.max(simd.max(absolute(simd, v[0]), absolute(simd, v[1])), absolute(simd, v[2]))
+    simd.max(simd.max(simd.abs(v[0]), simd.abs(v[1])), simd.abs(v[2]))
 }
 
 #[inline(always)]

@@ -179,9 +179,9 @@ impl Tile {
         for k in 0..3 {
             let offset = simd.sub(simd.load(&columns[k]), simd.splat(self.origin[k]));
             direction[k] = simd.load(&columns[3 + k]);
-            elsewhere = simd.max(absolute(simd, offset), elsewhere);
+            elsewhere = simd.max(simd.abs(offset), elsewhere);
             elsewhere = simd.add(elsewhere, simd.mul(direction[k], zero));
-            largest = simd.max(absolute(simd, direction[k]), largest);
+            largest = simd.max(simd.abs(direction[k]), largest);
         }
         let [x, y, z] = self.axes.map(|axis| direction[axis]);
         let (tmin, tmax) = (simd.load(&columns[6]), simd.load(&columns[7]));
@@ -195,7 +195,7 @@ impl Tile {
         if fits != 0xff {
             return false;
         }
-        let steeper = simd.le(rise, simd.max(absolute(simd, x), absolute(simd, y)));
+        let steeper = simd.le(rise, simd.max(simd.abs(x), simd.abs(y)));
         self.slanted |= u32::from(steeper != 0) << self.count;
 
         let length = simd.and(largest, simd.splat(f32::INFINITY));
@@ -312,11 +312,6 @@ impl Group {
             self.half[k] = (high - self.middle[k]).max(self.middle[k] - low);
         }
     }
-}
-
-#[inline(always)]
-pub fn absolute<S: Simd>(simd: S, value: S::F32) -> S::F32 {
-    simd.and(value, simd.splat(f32::from_bits(i32::MAX as u32)))
 }
 
 /// The least and the greatest of each lane.
