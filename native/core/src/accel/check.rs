@@ -88,6 +88,9 @@ fn assert_branch(structure: &Structure, index: usize, place: &Place) {
         lanes.sort_unstable();
         assert_eq!(lanes, std::array::from_fn(|lane| lane as u32), "order of visits of node {index}");
     }
+    let leaf = |lane: &usize| matches!(node.child[*lane].target(), Target::Leaf { .. });
+    let leaves = (0..LANES).filter(leaf).fold(0, |leaves, lane| leaves | 1 << lane);
+    assert_eq!(node.leaves(), leaves, "leaves of node {index}");
     let around = check_lattice::reach(structure, place);
     for child in places::children(structure, place) {
         assert_contains(&around, &child.bounds);

@@ -133,6 +133,12 @@ impl NodeRef {
         }
     }
 
+    /// 1 for a leaf, else 0.
+    #[inline(always)]
+    fn is_leaf(self) -> u32 {
+        u32::from(self.0 >> Self::TAG == 1)
+    }
+
     /// What it refers to.
     #[inline(always)]
     pub fn target(self) -> Target {
@@ -175,9 +181,13 @@ pub struct Node {
     /// The children; the used ones come first.
     pub child: [NodeRef; LANES],
     /// For rays of each octant (see [`Frame::octant`](crate::traverse::frame::Frame::octant)) the eight lanes, three
-    /// bits each, the one to visit last in the lowest bits.
+    /// bits each, the one to visit last in the lowest bits. In the highest eight bits of each word, the lanes that are
+    /// leaves.
     pub order: [u32; LANES],
 }
+
+/// Where the leaves stand in a word of [`Node::order`].
+const LEAVES: u32 = 24;
 
 impl Node {
     /// A node without children.
@@ -210,18 +220,25 @@ impl Node {
         node
     }
 
-    /// Set the order of visits from the boxes: by where their centres lie along the octant's diagonal. What comes
-    /// first in an octant comes last in the opposite one.
+    /// Set the order of visits from the children and their boxes: by where their centres lie along the octant's
+    /// diagonal. What comes first in an octant comes last in the opposite one.
     pub fn set_order(&mut self) {
+        let leaves = self.child.iter().enumerate().fold(0, |leaves, (lane, child)| leaves | child.is_leaf() << lane);
         let [x, y, z]: [[f32; LANES]; 3] =
             std::array::from_fn(|k| std::array::from_fn(|lane| self.plane[k][lane] + self.plane[3 + k][lane]));
         for octant in 0..4 {
             let (sx, sy) = (sign(octant & 1), sign(octant >> 1));
             let depth: [f32; LANES] = std::array::from_fn(|lane| sx * x[lane] + sy * y[lane] + z[lane]);
             let forward = ranks(&depth);
-            self.order[octant] = in_order(&forward);
-            self.order[7 - octant] = in_order(&forward.map(|rank| LANES as u32 - 1 - rank));
+            self.order[octant] = leaves << LEAVES | in_order(&forward);
+            self.order[7 - octant] = leaves << LEAVES | in_order(&forward.map(|rank| LANES as u32 - 1 - rank));
         }
+    }
+
+    /// The lanes that are leaves.
+    #[inline(always)]
+    pub fn leaves(&self) -> u32 {
+        self.order[0] >> LEAVES
     }
 
     /// How many children it has.
@@ -254,7 +271,7 @@ fn ranks(depth: &[f32; LANES]) -> [u32; LANES] {
     ranks
 }
 
-/// A word of [`Node::order`].
+/// The order of visits in a word of [`Node::order`].
 #[inline(always)]
 fn in_order(ranks: &[u32; LANES]) -> u32 {
     ranks.iter().enumerate().fold(0, |order, (lane, rank)| order | (lane as u32) << (3 * (LANES as u32 - 1 - rank)))

@@ -152,7 +152,7 @@ pub fn trace<S: Simd, const GRIDS: bool, const ANY: bool>(
         }
         match node.target() {
             Target::Branch(index) if ids.len() >= FEW => {
-                branch(simd, here, index as usize, octant, ids, &bin.frames, lists);
+                branch::<S, ANY>(simd, here, index as usize, octant, ids, &bin.frames, lists);
             }
             Target::Leaf { block, count } => {
                 let block = &here.blocks[block as usize];
@@ -181,9 +181,10 @@ pub fn warm<S: Simd>(simd: S, here: View<'_>, node: NodeRef) {
     }
 }
 
-/// Divide the rays at a node among its children, the nearest child's on top.
+/// Divide the rays at a node among its children, the nearest child's on top; where any hit will do, the leaves' on top
+/// of the branches', since the rays that they stop need not go deeper.
 #[inline(always)]
-fn branch<S: Simd>(
+fn branch<S: Simd, const ANY: bool>(
     simd: S,
     here: View<'_>,
     index: usize,
@@ -204,18 +205,22 @@ fn branch<S: Simd>(
         any |= met;
     }
     lists.masks[ids.len()..padded].fill(0);
-    let mut order = node.order[octant];
-    for _ in 0..LANES {
-        let child = order & 7;
-        order >>= 3;
-        if any >> child & 1 == 0 {
-            continue;
+    let leaves = if ANY { node.leaves() } else { 0 };
+    for mut rest in [any & !leaves, any & leaves] {
+        let mut order = node.order[octant];
+        while rest != 0 {
+            let child = order & 7;
+            order >>= 3;
+            if rest >> child & 1 == 0 {
+                continue;
+            }
+            rest &= !(1 << child);
+            let (from, to) = lists.ids.split_at_mut(end);
+            let count = simd.compact(&lists.masks[..padded], child, &from[start..start + padded], &mut to[..padded]);
+            warm(simd, here, node.child[child as usize]);
+            lists.visits.push(Visit { node: node.child[child as usize], start: end as u32, count: count as u32 });
+            end += count;
         }
-        let (from, to) = lists.ids.split_at_mut(end);
-        let count = simd.compact(&lists.masks[..padded], child, &from[start..start + padded], &mut to[..padded]);
-        warm(simd, here, node.child[child as usize]);
-        lists.visits.push(Visit { node: node.child[child as usize], start: end as u32, count: count as u32 });
-        end += count;
     }
 }
 
