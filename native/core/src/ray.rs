@@ -42,16 +42,24 @@ impl<'a> Column<'a> {
     /// The values of rays `index` to `index + 7`.
     #[inline(always)]
     fn eight(&self, index: usize) -> [f32; 8] {
-        if let (1, Some(values)) = (self.stride, self.values.get(index..index + 8)) {
-            let mut eight = [0.0; 8];
-            eight.copy_from_slice(values);
-            return eight;
+        match self.stride {
+            0 => [self.values[0]; 8],
+            1 => *self.span::<8>(index),
+            3 => spread::<22, 3>(self.span(3 * index)),
+            stride => {
+                let mut eight = [0.0; 8];
+                for lane in 0..8 {
+                    eight[lane] = self.values[(index + lane) * stride];
+                }
+                eight
+            }
         }
-        let mut eight = [0.0; 8];
-        for lane in 0..8 {
-            eight[lane] = self.values[(index + lane) * self.stride];
-        }
-        eight
+    }
+
+    /// The values from one on.
+    #[inline(always)]
+    fn span<const N: usize>(&self, first: usize) -> &[f32; N] {
+        self.values[first..].first_chunk().expect("every column has a value for every ray")
     }
 
     /// The value of ray `index`.
@@ -59,6 +67,16 @@ impl<'a> Column<'a> {
     pub fn get(&self, index: usize) -> f32 {
         self.values[index * self.stride]
     }
+}
+
+/// Eight numbers that stand so many places apart, as coordinates of points do in rows.
+#[inline(always)]
+fn spread<const N: usize, const STRIDE: usize>(values: &[f32; N]) -> [f32; 8] {
+    let mut eight = [0.0; 8];
+    for lane in 0..8 {
+        eight[lane] = values[STRIDE * lane];
+    }
+    eight
 }
 
 /// A batch of rays: origin, direction (any length but zero) and the parameter interval `[tmin, tmax]`, both ends

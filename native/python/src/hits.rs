@@ -9,6 +9,7 @@ use pyo3::{prelude::*, sync::PyOnceLock};
 use crate::{
     arrays::{self, List, Table},
     errors::{OrRaise, guard},
+    paged,
 };
 
 /// What a closest-hit query found, one element a ray, in read-only arrays.
@@ -46,10 +47,10 @@ impl<'py> Room<'py> {
     /// Room for the hits of `count` rays.
     pub fn new(py: Python<'py>, count: usize) -> PyResult<Self> {
         Ok(Self {
-            t: arrays::empty(py, count)?,
-            primitive: arrays::empty(py, count)?,
-            u: arrays::empty(py, count)?,
-            v: arrays::empty(py, count)?,
+            t: paged::empty(py, count)?,
+            primitive: paged::empty(py, count)?,
+            u: paged::empty(py, count)?,
+            v: paged::empty(py, count)?,
         })
     }
 

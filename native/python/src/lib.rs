@@ -18,6 +18,7 @@ mod job;
 mod light;
 mod material;
 mod mesh;
+mod paged;
 mod rays;
 mod render;
 mod scene;
