@@ -47,10 +47,14 @@ def paper(rows: list[Row]) -> list[str]:
     lines = [_line(head), _line(["---", *["---:"] * (len(head) - 1)])]
     for scene in dict.fromkeys(row["scene"] for row in rows):
         first, *others = (row for row in rows if row["scene"] == scene)
-        times = " / ".join(f"{first[part] * 1e3:.0f}" for part in first["ratios"])
+        times = " / ".join(_milliseconds(first[part]) for part in first["ratios"])
         parts = [" / ".join(f"{value:.2f}" for value in row["ratios"].values()) for row in others]
         lines.append(_line([scene, times, *parts]))
     return lines
+
+
+def _milliseconds(seconds: float) -> str:
+    return f"{seconds * 1e3:.0f}" if seconds >= 0.01 else f"{seconds * 1e3:.1f}"
 
 
 def _column(batch: int, reach: float | None) -> str:

@@ -142,3 +142,19 @@ def test_methods_agree_on_rays_of_every_reach_and_batch(tmp_path: Path, monkeypa
     assert len(cases) == len(settings["reaches"]) * 3
     assert cases[0].occupancy > 0.9
     assert all(steps > 0 for case in cases for steps, _ in case.counts.values())
+
+
+def test_readme_says_what_is_recorded() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    lines = text.splitlines()
+    said = markdown.ratios(markdown.recorded_cases()) + markdown.paper(markdown.recorded("paper")["rows"])
+    assert [line for line in said if line not in lines] == []
+    assert [name for name in ("grids", "paper") if markdown.recorded(name)["about"]["commit"] not in text] == []
+
+
+def test_recorded_figure_is_that_of_the_recorded_cases() -> None:
+    kept = ET.parse(ROOT / "tests" / "bench" / "record" / "grids.svg").getroot()
+    name = "{http://www.w3.org/2000/svg}"
+    scenes = list(dict.fromkeys(case.scene for case in markdown.recorded_cases()))
+    titles = [text.text for text in kept.iter(f"{name}text") if text.get("class") == "name"]
+    assert titles == scenes
