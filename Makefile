@@ -13,7 +13,7 @@ PORTABLE   := $(if $(filter Linux,$(shell uname)),--zig --compatibility manylinu
 VERSION    := $(shell sed -n 's/^version = "\(.*\)"/\1/p' blender_manifest.toml)
 ZIP        := dist/espalier-$(VERSION).zip
 
-.PHONY: help demo study test test-native test-addon test-aarch64 check check-native check-addon format bench bench-instructions bench-interfaces bench-growth bench-threads package clean
+.PHONY: help demo study test test-native test-addon test-aarch64 check check-native check-addon format bench bench-instructions bench-interfaces bench-growth bench-threads bench-grids bench-paper package clean
 .DELETE_ON_ERROR:
 
 help: ## List these commands
@@ -69,6 +69,12 @@ bench-growth: .venv/ready ## Measure build time and memory per triangle, 100 tho
 
 bench-threads: .venv/ready ## Measure two threads against one, building and tracing [SCENES=...] [METHODS=...] [RECORD=1]
 	$(BIN)/python tests/bench/scaling.py threads
+
+bench-grids: .venv/ready ## Measure when a grid beats a hierarchy, by content, length and batches of rays [SCENES=...] [RECORD=1]
+	$(BIN)/python tests/bench/grids.py
+
+bench-paper: .venv/ready ## Measure the paper's comparison in its setting, one ray at a time [SCENES=...] [METHODS=...] [RECORD=1]
+	$(BIN)/python tests/bench/paper.py
 
 package: $(ZIP) ## Make the extension's zip in dist/, as Blender installs it
 

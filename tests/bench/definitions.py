@@ -15,9 +15,13 @@ from numpy.typing import NDArray
 import espalier_scenes
 from espalier_scenes.models import folder
 from espalier_scenes.ply import read_ply
+from espalier_scenes.soups import triangle_soup
 
 FILE = Path(__file__).with_name("definitions.toml")
 HITS = Path(__file__).with_name("hits.json")
+
+BLOCKS = 8
+"""Blocks of a soup's cube along each axis."""
 
 Mesh = tuple[NDArray[np.float32], NDArray[np.uint32]]
 
@@ -51,6 +55,28 @@ class Scene:
 
 
 @dataclass(frozen=True)
+class Soup(Scene):
+    """A scene of single triangles: `filled` is the share of the cube's blocks that hold some."""
+
+    triangles: int = 0
+    edge: float = 0.0
+    filled: float = 1.0
+
+    def mesh(self) -> Mesh:
+        """(3n, 3) vertices and (n, 3) triangles, spread over the cube -1..1."""
+        vertices, triangles = triangle_soup(count=self.triangles, size=self.edge)
+        blocks = np.arange(BLOCKS**3)
+        random = np.random.default_rng(1)
+        filled = random.choice(blocks, round(self.filled * len(blocks)), replace=False)
+        if len(filled) == len(blocks):
+            return vertices, triangles
+        offsets = vertices.reshape(-1, 3, 3) - vertices.reshape(-1, 3, 3).mean(axis=1, keepdims=True)
+        corner = np.stack(np.unravel_index(random.choice(filled, self.triangles), (BLOCKS,) * 3), axis=-1)
+        centers = 2 * (corner + random.uniform(size=(self.triangles, 3))) / BLOCKS - 1
+        return (centers[:, None] + offsets).reshape(-1, 3).astype(np.float32), triangles
+
+
+@dataclass(frozen=True)
 class Definitions:
     """All of definitions.toml; `scenes` in the order in which they are listed there."""
 
@@ -62,6 +88,9 @@ class Definitions:
     classes: dict[str, dict[str, Any]]
     scenes: dict[str, Scene]
     instructions: dict[str, Any]
+    grids: dict[str, Any]
+    paper: dict[str, Any]
+    soups: dict[str, Soup]
 
     def choose_classes(self, names: Iterable[str]) -> list[dict[str, Any]]:
         """The plan's classes: those named, or all. Raises DefinitionError."""
@@ -104,6 +133,7 @@ def load() -> Definitions:
         camera = table["camera"] | entry.pop("camera", {})
         path = None if "catalogue" in entry else (models / f"{name}.ply").resolve()
         table["scenes"][name] = Scene(name, camera, path=path, hits=answers.get(name, {}), **entry)
+    table["soups"] = {name: Soup(name, table["camera"], **entry) for name, entry in table["soups"].items()}
     return Definitions(**table)
 
 

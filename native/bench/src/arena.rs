@@ -1,23 +1,26 @@
 //! Where a class is measured: who races over what, and whether their answers agree.
 
-use std::{cell::RefCell, time::Duration};
+use std::{cell::RefCell, num::NonZero, time::Duration};
 
-use espalier_core::{Accelerator, Hits, Job, Method, Rays, pool};
+use espalier_core::{Accelerator, Hits, Job, Method, Rays, pool, traverse::probe::Counts};
 
 use crate::{
     embree::Device,
     error::Error,
     plan::{Class, Kind, Quality, Query},
-    race::{Length, Run, Side, fastest, race, timed},
+    race::{Contender, Length, Run, Side, fastest, race, timed},
     rays::RayColumns,
     rivals::{Answer, Rivals, Way, trace},
-    row::{Row, Unit},
+    row::{Row, Turn, Unit},
     scene::{Built, Scene, new_mesh},
     verify::{self, Comparison},
 };
 
 /// Rounds of Embree's builds that are only shown.
 const ROUNDS_BESIDE: usize = 3;
+
+/// Rays whose steps and tests are counted.
+const SAMPLE: usize = 256;
 
 /// Both sides over one scene.
 pub struct Arena<'a> {
@@ -70,11 +73,55 @@ impl<'a> Arena<'a> {
         methods.iter().map(|&method| row(method)).collect()
     }
 
+    /// Measure a class without Embree: a row for each of our methods, whose hits are those of its last round.
+    ///
+    /// # Errors
+    /// Those of our side.
+    pub fn turns(&self, class: &Class) -> Result<Vec<Turn>, Error> {
+        let methods = class.methods.iter().map(|name| Method::from_name(name)).collect::<Result<Vec<_>, _>>()?;
+        let courses = methods.iter().map(|_| self.course(class)).collect::<Result<Vec<_>, _>>()?;
+        let field = methods.iter().zip(&courses);
+        let field = field.map(|(&method, course)| (Side::Ours(method), self.our_run(course, method)));
+        let field = race(field.collect(), self.length(class))?;
+        let turn = |((&method, course), contender): ((&Method, &Course<'_>), &Contender<'_>)| -> Result<Turn, Error> {
+            let (first, own) = (courses[0].answer.borrow(), course.answer.borrow());
+            let comparison = verify::closest(&self.scene.mesh, &course.rays, &own.hits, &first.hits);
+            let (steps, tests) = self.work(course, method)?;
+            Ok(Turn {
+                scene: self.scene.plan.scene.name.clone(),
+                class: class.name.clone(),
+                method: method.name(),
+                isa: self.scene.level().name(),
+                seconds: contender.best.as_secs_f64(),
+                rays: course.rays.len(),
+                hits: comparison.hits,
+                mismatches: comparison.mismatches,
+                steps,
+                tests,
+            })
+        };
+        methods.iter().zip(&courses).zip(&field).map(turn).collect()
+    }
+
+    /// Steps and tests of the first rays of a course, in the mean; none of no rays.
+    fn work(&self, course: &Course<'_>, method: Method) -> Result<(f64, f64), Error> {
+        let mut counts = vec![Counts::default(); course.rays.len().min(SAMPLE)];
+        if counts.is_empty() {
+            return Ok((0.0, 0.0));
+        }
+        let sample = course.rays.rays().part(0, SAMPLE);
+        self.built.get(method)?.counted(&sample, &mut counts, self.scene.plan.threads, &Job::new())?;
+        let mean = |count: fn(&Counts) -> u32| {
+            counts.iter().map(|counts| f64::from(count(counts))).sum::<f64>() / counts.len() as f64
+        };
+        Ok((mean(|counts| counts.steps), mean(|counts| counts.tests)))
+    }
+
     fn length(&self, class: &Class) -> Length {
         let plan = self.scene.plan;
         // Bytes are the same every time.
         let rounds = if class.kind == Kind::Memory { 1 } else { plan.rounds };
-        Length { rounds, time: Duration::from_secs_f64(plan.seconds) }
+        Length { rounds, time: Duration::from_secs_f64(plan.seconds), ours_hopeless: plan.hopeless }
     }
 
     fn course<'c>(&self, class: &'c Class) -> Result<Course<'c>, Error> {
@@ -174,11 +221,27 @@ pub fn trace_ours(
     answer: &mut Answer,
 ) -> Result<(), Error> {
     let (job, rays) = (Job::new(), rays.rays());
-    match (class.kind, class.query) {
-        (Kind::Single, Query::Closest) => one_by_one(ours, &rays, threads, &mut answer.hits)?,
-        (Kind::Single, Query::Any) => return Err(Error::Plan("single rays are closest-hit queries".into())),
-        (_, Query::Closest) => ours.closest(&rays, answer.hits.as_mut(), threads, &job)?,
-        (_, Query::Any) => ours.occluded(&rays, &mut answer.blocked, threads, &job)?,
+    let batch = if class.kind == Kind::Single { Some(1) } else { class.batch.map(NonZero::get) };
+    match (class.query, batch) {
+        (Query::Closest, None) => ours.closest(&rays, answer.hits.as_mut(), threads, &job)?,
+        (Query::Closest, Some(1)) => one_by_one(ours, &rays, threads, &mut answer.hits)?,
+        (Query::Closest, Some(size)) => in_calls(ours, &rays, size, threads, &mut answer.hits)?,
+        (Query::Any, None) => ours.occluded(&rays, &mut answer.blocked, threads, &job)?,
+        (Query::Any, Some(_)) => return Err(Error::Plan("rays in batches are closest-hit queries".into())),
+    }
+    Ok(())
+}
+
+/// All rays by calls of `size` each.
+fn in_calls(
+    ours: &Accelerator,
+    rays: &Rays<'_>,
+    size: usize,
+    threads: usize,
+    hits: &mut Hits,
+) -> Result<(), espalier_core::Error> {
+    for (call, hits) in hits.as_mut().parts(size).enumerate() {
+        ours.closest(&rays.part(call * size, size), hits, threads, &Job::new())?;
     }
     Ok(())
 }

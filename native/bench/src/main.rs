@@ -1,7 +1,8 @@
 //! Espalier against Embree on the same rays, in one process, in turns. For development only: `tests/bench/run.py`
 //! writes the plans, starts this, and shows what it prints, one JSON object a line.
 //!
-//! `espalier-bench race PLAN.json` measures; `espalier-bench hits PLAN.json` only counts the hits of the plan's
+//! `espalier-bench race PLAN.json` measures; `espalier-bench turns PLAN.json` measures our methods against each other,
+//! without Embree; `espalier-bench hits PLAN.json` only counts the hits of the plan's
 //! rays, without Embree; `espalier-bench rays PLAN.json CLASS FILE` writes them; `espalier-bench steps PLAN.json
 //! METHODS` counts what rays do in trees; `espalier-bench phases PLAN CLASS METHOD REPEATS` takes a picture's time
 //! apart; `espalier-bench work PLAN.json CLASS METHOD REPEATS` does what a class times, without Embree, and prints the
@@ -33,6 +34,7 @@ fn main() -> ExitCode {
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let result = match arguments[..] {
         ["race", plan] => Plan::read(Path::new(plan)).and_then(|plan| race(&plan)),
+        ["turns", plan] => Plan::read(Path::new(plan)).and_then(|plan| turns(&plan)),
         ["hits", plan] => Plan::read(Path::new(plan)).and_then(|plan| hits(&plan)),
         ["rays", plan, class, file] => Plan::read(Path::new(plan)).and_then(|plan| rays(&plan, class, Path::new(file))),
         ["work", plan, class, method, repeats] => {
@@ -43,7 +45,7 @@ fn main() -> ExitCode {
         }
         ["steps", plan, methods] => Plan::read(Path::new(plan)).and_then(|plan| steps(&plan, methods)),
         _ => Err(Error::Plan(
-            "the arguments are: race PLAN, hits PLAN, rays PLAN CLASS FILE, steps PLAN METHODS, phases PLAN CLASS METHOD REPEATS, or work PLAN CLASS METHOD REPEATS".into(),
+            "the arguments are: race PLAN, turns PLAN, hits PLAN, rays PLAN CLASS FILE, steps PLAN METHODS, phases PLAN CLASS METHOD REPEATS, or work PLAN CLASS METHOD REPEATS".into(),
         )),
     };
     match result {
@@ -63,6 +65,18 @@ fn race(plan: &Plan) -> Result<(), Error> {
     let arena = arena::Arena::new(&scene, &devices);
     for class in &plan.classes {
         for row in arena.measure(class)? {
+            println!("{}", serde_json::to_string(&row).expect("rows are plain data"));
+        }
+    }
+    Ok(())
+}
+
+/// Our methods alone.
+fn turns(plan: &Plan) -> Result<(), Error> {
+    let scene = scene::Scene::read(plan)?;
+    let arena = arena::Arena::new(&scene, &[]);
+    for class in &plan.classes {
+        for row in arena.turns(class)? {
             println!("{}", serde_json::to_string(&row).expect("rows are plain data"));
         }
     }

@@ -1,6 +1,9 @@
 //! What to measure: the JSON that `tests/bench/run.py` writes from its definitions.
 
-use std::path::{Path, PathBuf};
+use std::{
+    num::NonZero,
+    path::{Path, PathBuf},
+};
 
 use serde::{Deserialize, Serialize};
 
@@ -20,8 +23,16 @@ pub struct Plan {
     pub rounds: usize,
     /// A race ends after the round in which this much time has passed, but not before its third.
     pub seconds: f64,
+    /// Methods that take this many times as long as the fastest leave the race after its second round; none where absent.
+    #[serde(default)]
+    pub hopeless: Option<f64>,
     /// Pixels along each side of the image, a multiple of 8.
     pub resolution: usize,
+    /// Where given, [`Method::Fellner`](espalier_core::Method::Fellner) stands for a single grid over the whole scene, of
+    /// so many cells a triangle, whose cells are leaves, or small hierarchies where more triangles than a leaf's lie in
+    /// them. Such a grid has no method of its own; that one can make it.
+    #[serde(default)]
+    pub grid_of_leaves: Option<f64>,
     /// What is looked at.
     pub scene: SceneFile,
     /// What is measured.
@@ -87,6 +98,9 @@ pub struct Class {
     /// What is asked about each ray.
     #[serde(default)]
     pub query: Query,
+    /// Rays of one call of ours; all of them where absent. A single one is traced by a walker.
+    #[serde(default)]
+    pub batch: Option<NonZero<usize>>,
 }
 
 /// What a class does with its rays.
@@ -129,6 +143,13 @@ pub enum RayPlan {
     /// Cosine-distributed from where each primary ray hit; they end after this share of the diagonal of the mesh's
     /// box, or never.
     Bounce {
+        /// Share of the diagonal.
+        reach: Option<f64>,
+    },
+    /// In no order, from anywhere in the mesh's box to anywhere; they end as those of [`RayPlan::Bounce`] do.
+    Inside {
+        /// How many.
+        count: usize,
         /// Share of the diagonal.
         reach: Option<f64>,
     },

@@ -25,6 +25,7 @@ pub struct Contender<'a> {
     /// Least time so far.
     pub best: Duration,
     run: Run<'a>,
+    is_out: bool,
 }
 
 /// How long a race lasts.
@@ -34,6 +35,9 @@ pub struct Length {
     pub rounds: usize,
     /// It ends after the round in which this much time has passed, but not before round [`Length::LEAST`].
     pub time: Duration,
+    /// After the first two rounds, those of ours that take this many times as long as the fastest of all take no more
+    /// part; their times stay. Without it all of ours run to the end.
+    pub ours_hopeless: Option<f64>,
 }
 
 impl Length {
@@ -48,19 +52,22 @@ const HOPELESS: f64 = 1.15;
 /// # Errors
 /// The first error of any contender.
 pub fn race(field: Vec<(Side, Run<'_>)>, length: Length) -> Result<Vec<Contender<'_>>, Error> {
-    let contender = |(side, run)| Contender { side, best: Duration::MAX, run };
+    let contender = |(side, run)| Contender { side, best: Duration::MAX, run, is_out: false };
     let mut field: Vec<_> = field.into_iter().map(contender).collect();
     let start = Instant::now();
     for round in 0..length.rounds {
         if round >= Length::LEAST && start.elapsed() > length.time {
             break;
         }
-        for contender in &mut field {
+        for contender in field.iter_mut().filter(|contender| !contender.is_out) {
             contender.best = contender.best.min((contender.run)()?);
         }
         if round == 1 {
             let limit = fastest(&field).map_or(Duration::MAX, |(_, best)| best.mul_f64(HOPELESS));
             field.retain(|contender| matches!(contender.side, Side::Ours(_)) || contender.best <= limit);
+            let least = field.iter().map(|contender| contender.best).min().unwrap_or(Duration::MAX);
+            let slow = length.ours_hopeless.map_or(Duration::MAX, |times| least.mul_f64(times));
+            field.iter_mut().for_each(|contender| contender.is_out = contender.best > slow);
         }
     }
     Ok(field)

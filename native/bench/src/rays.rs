@@ -61,7 +61,7 @@ pub fn bounce(mesh: &Mesh, primary: &Rays<'_>, hits: &Hits, reach: Option<f64>, 
     let bounds = mesh.bounds();
     let diagonal = (bounds.upper - bounds.lower).as_dvec3().length();
     let lift = LIFT * f64::from(bounds.lower.abs().max(bounds.upper.abs()).max_element()).max(diagonal);
-    let tmax = reach.map_or(f32::INFINITY, |reach| (reach * diagonal) as f32);
+    let tmax = end(reach, diagonal);
     for index in (0..hits.len()).filter(|&index| hits.primitive[index] != MISS) {
         let ray = primary.get(index);
         let (origin, direction) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
@@ -75,6 +75,25 @@ pub fn bounce(mesh: &Mesh, primary: &Rays<'_>, hits: &Hits, reach: Option<f64>, 
         rays.push(start.as_vec3(), Random::new(!seed, index).cosine(normal).as_vec3(), tmax);
     }
     rays
+}
+
+/// `count` rays from uniform points of the mesh's box in uniform directions, as long as `reach` times its diagonal, or
+/// endless.
+pub fn inside(mesh: &Mesh, count: usize, reach: Option<f64>, seed: u64) -> RayColumns {
+    let mut rays = RayColumns::default();
+    let (lower, extent) = (mesh.bounds().lower.as_dvec3(), (mesh.bounds().upper - mesh.bounds().lower).as_dvec3());
+    let tmax = end(reach, extent.length());
+    for index in 0..count {
+        let mut random = Random::new(seed, index);
+        let start = lower + extent * DVec3::from_array([(); 3].map(|()| random.next()));
+        rays.push(start.as_vec3(), random.direction().as_vec3(), tmax);
+    }
+    rays
+}
+
+/// Where rays end that reach so far, as a share of the diagonal.
+fn end(reach: Option<f64>, diagonal: f64) -> f32 {
+    reach.map_or(f32::INFINITY, |reach| (reach * diagonal) as f32)
 }
 
 /// Random numbers of one ray: splitmix64 (Steele, Lea and Flood, "Fast Splittable Pseudorandom Number Generators",
@@ -98,6 +117,16 @@ impl Random {
     /// Uniform in [0, 1).
     fn next(&mut self) -> f64 {
         (self.bits() >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    /// A uniform unit direction: that of a uniform point of the ball.
+    fn direction(&mut self) -> DVec3 {
+        loop {
+            let point = DVec3::from_array([(); 3].map(|()| 2.0 * self.next() - 1.0));
+            if (1e-6..1.0).contains(&point.length_squared()) {
+                return point.normalize();
+            }
+        }
     }
 
     /// A unit direction about a unit normal with density proportional to the cosine between them: a uniform point of

@@ -52,6 +52,31 @@ impl Row {
     }
 }
 
+/// One class over one scene by one of our methods, raced against the others of the class without Embree.
+#[derive(Debug, Serialize)]
+pub struct Turn {
+    /// Scene.
+    pub scene: String,
+    /// Class.
+    pub class: String,
+    /// Our method.
+    pub method: &'static str,
+    /// Our instruction set.
+    pub isa: &'static str,
+    /// The best round.
+    pub seconds: f64,
+    /// How many rays there were.
+    pub rays: usize,
+    /// Of these, how many hit.
+    pub hits: usize,
+    /// How many are answered otherwise than by the class's first method.
+    pub mismatches: usize,
+    /// Traversal steps a ray, in the mean of a sample.
+    pub steps: f64,
+    /// Ray-triangle tests a ray, in the mean of the same sample.
+    pub tests: f64,
+}
+
 /// What times are shown as.
 #[derive(Debug, Clone, Copy)]
 pub enum Unit {

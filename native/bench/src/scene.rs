@@ -7,7 +7,7 @@ use std::{
     sync::Arc,
 };
 
-use espalier_core::{Accelerator, Config, Hits, Job, Mesh, Method, simd::Level};
+use espalier_core::{Accelerator, Config, Hits, Job, Mesh, Method, accel::config::CostConstants, simd::Level};
 use glam::Vec3;
 
 use crate::{
@@ -60,7 +60,11 @@ impl<'a> Scene<'a> {
     /// # Errors
     /// [`Error::Core`].
     pub fn build(&self, mesh: Arc<Mesh>, method: Method) -> Result<Accelerator, Error> {
-        let built = Accelerator::build(mesh, method, &Config::default(), self.plan.threads, &Job::new())?;
+        let config = match (method, self.plan.grid_of_leaves) {
+            (Method::Fellner, Some(density)) => grid_of_leaves(density, mesh.solid_count()),
+            _ => Config::default(),
+        };
+        let built = Accelerator::build(mesh, method, &config, self.plan.threads, &Job::new())?;
         Ok(built.with_level(self.level))
     }
 
@@ -77,13 +81,16 @@ impl<'a> Scene<'a> {
     /// # Errors
     /// [`Error::Core`].
     pub fn rays(&self, plan: RayPlan, built: &Built<'_>) -> Result<RayColumns, Error> {
-        let primary = self.primary();
-        let RayPlan::Bounce { reach } = plan else {
-            return Ok(primary.clone());
+        let seed = self.plan.scene.seed;
+        let reach = match plan {
+            RayPlan::Primary => return Ok(self.primary().clone()),
+            RayPlan::Inside { count, reach } => return Ok(rays::inside(&self.mesh, count, reach, seed)),
+            RayPlan::Bounce { reach } => reach,
         };
+        let primary = self.primary();
         let mut hits = Hits::misses(primary.len());
         built.get(REFERENCE)?.closest(&primary.rays(), hits.as_mut(), self.plan.threads, &Job::new())?;
-        Ok(rays::bounce(&self.mesh, &primary.rays(), &hits, reach, self.plan.scene.seed))
+        Ok(rays::bounce(&self.mesh, &primary.rays(), &hits, reach, seed))
     }
 }
 
@@ -122,8 +129,27 @@ impl<'a> Built<'a> {
             return Ok(accelerator.clone());
         }
         let accelerator = Arc::new(self.scene.build(self.scene.mesh.clone(), method)?);
+        let Plan { grid_of_leaves, .. } = self.scene.plan;
+        if method == Method::Fellner && grid_of_leaves.is_some() && accelerator.census().grids != 1 {
+            return Err(Error::Plan(format!("{} does not become one grid of leaves", self.scene.plan.scene.name)));
+        }
         self.accelerators.borrow_mut().insert(method, accelerator.clone());
         Ok(accelerator)
+    }
+}
+
+/// Settings with which [`Method::Fellner`] makes one grid of leaves of a scene: only its root may become a grid, and
+/// nodes and lists are dear.
+fn grid_of_leaves(density: f64, triangles: usize) -> Config {
+    let cost = CostConstants { node_ns: 1e6, gather_ns: 1e6, block_ns: 0.1, cell_ns: 0.1, ..CostConstants::default() };
+    Config {
+        grid_density: density,
+        grid_least_triangles: triangles,
+        grid_most_triangles: triangles,
+        grid_gain: 1.0,
+        nesting: 1,
+        cost,
+        ..Config::default()
     }
 }
 
