@@ -32,9 +32,6 @@ Row = dict[str, Any]
 OUT = Path("out")
 COUNTS = (1e3, 1e8)
 """Numbers of rays between which the fastest method is told."""
-LEAVES, MAKER = "grid-of-leaves", "fellner"
-"""The grid whose cells are leaves instead of lists has no method, so nobody has sped up its build, which is not timed;
-the harness makes it with this one's builder, and its rows say so."""
 
 
 def main() -> int:
@@ -83,17 +80,16 @@ def chosen(defined: definitions.Definitions, names: list[str]) -> list[definitio
 def measured(defined: definitions.Definitions, scene: definitions.Scene, binary: Path) -> Iterator[Row]:
     """The harness's rows of a scene: of builds, and of every reach and batch."""
     settings = defined.grids
-    built = [name for name in settings["grids"] if name != LEAVES] + settings["hierarchies"]
+    built = [name for name in settings["grids"] if name != harness.LEAVES] + settings["hierarchies"]
     classes = [{"name": "build", "kind": "build", "methods": built, "rival": []}]
     yield from _run(defined, scene, binary, classes, settings["build_seconds"])
-    common = {"kind": "batch", "methods": [*built, MAKER], "rival": []}
+    common = {"kind": "batch", "methods": [*built, harness.LEAVES], "rival": []}
     classes = [
         common | {"name": f"{reach} {batch}", "batch": batch, "rays": rays(max(settings["rays"], batch), reach)}
         for reach in settings["reaches"]
         for batch in settings["batches"]
     ]
-    for row in _run(defined, scene, binary, classes, settings["seconds"]):
-        yield row | {"method": LEAVES if row["method"] == MAKER else row["method"]}
+    yield from _run(defined, scene, binary, classes, settings["seconds"])
 
 
 def _run(
@@ -103,7 +99,7 @@ def _run(
     limits = {"rounds": settings["rounds"], "seconds": seconds, "hopeless": settings["hopeless"]}
     limits |= {"grid_of_leaves": settings["leaves_density"]}
     plan = defined.plan(scene, classes, directory, **limits)
-    return harness.run(binary, "turns", plan, directory / f"{scene.name}.json")
+    return harness.turns(binary, plan, directory / f"{scene.name}.json")
 
 
 def rays(count: int, reach: float) -> Row:
