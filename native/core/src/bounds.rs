@@ -107,6 +107,12 @@ impl BoundsA {
     }
 }
 
+impl From<Bounds> for BoundsA {
+    fn from(bounds: Bounds) -> Self {
+        Self { lower: bounds.lower.into(), upper: bounds.upper.into() }
+    }
+}
+
 impl From<BoundsA> for Bounds {
     fn from(bounds: BoundsA) -> Self {
         Self { lower: bounds.lower.into(), upper: bounds.upper.into() }

@@ -45,11 +45,3 @@ pub(crate) fn filled<T: Clone>(count: usize, value: T, what: &'static str) -> Re
     values.resize(count, value);
     Ok(values)
 }
-
-/// Lengthen a vector to `count` values, or [`Error::OutOfMemory`].
-pub(crate) fn grow<T: Clone>(values: &mut Vec<T>, count: usize, value: T, what: &'static str) -> Result<(), Error> {
-    let bytes = count.saturating_mul(size_of::<T>());
-    values.try_reserve(count.saturating_sub(values.len())).map_err(|_| Error::OutOfMemory { what, bytes })?;
-    values.resize(count, value);
-    Ok(())
-}

@@ -97,7 +97,7 @@ impl Boxes {
 /// Write a draft: blocks of triangles, then nodes around them from the last to the first. Returns the box of the root,
 /// in the mesh's own coordinates.
 pub fn fit(draft: &Draft, mesh: &Mesh, centre: Vec3A, site: &mut Site<'_>, boxes: &mut Boxes, level: Level) -> BoundsA {
-    level.run(Leaves { leaves: &draft.leaves, mesh, blocks: site.blocks, boxes: &mut boxes.leaves });
+    fill_all(&draft.leaves, mesh, site.blocks, boxes, level);
     boxes.nodes.clear();
     boxes.nodes.resize(draft.nodes.len(), BoundsA::EMPTY);
     for (index, children) in draft.nodes.iter().enumerate().rev() {
@@ -107,6 +107,11 @@ pub fn fit(draft: &Draft, mesh: &Mesh, centre: Vec3A, site: &mut Site<'_>, boxes
         boxes.nodes[index] = bounds.iter().fold(BoundsA::EMPTY, |all, bounds| all.union(bounds));
     }
     boxes.of(draft.root)
+}
+
+/// Write the blocks of leaves whose triangles are followed by [`MISS`]; the boxes around them remain in `boxes`.
+pub fn fill_all(leaves: &[[u32; LANES]], mesh: &Mesh, blocks: &mut [Block], boxes: &mut Boxes, level: Level) {
+    level.run(Leaves { leaves, mesh, blocks, boxes: &mut boxes.leaves });
 }
 
 /// Writes blocks and finds the boxes around them.

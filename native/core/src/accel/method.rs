@@ -1,6 +1,6 @@
 //! The methods: what each is called and what it builds, in one table.
 
-use super::pack::Opening;
+use super::layout::Opening;
 use crate::Error;
 
 /// How a structure is decided on: a row of [`ROWS`].

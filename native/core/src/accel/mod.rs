@@ -28,6 +28,7 @@ pub mod instant;
 pub mod irregular;
 pub mod lattice;
 mod lattices;
+pub mod layout;
 pub mod lazy;
 pub mod lbvh;
 pub mod links;

@@ -2,26 +2,24 @@
 //! side, leaves become blocks, grids are joined into one store. After Wald, Benthin and Boulos, "Getting Rid of
 //! Packets", RT 2008.
 
-use glam::Vec3;
+use glam::Vec3A;
+use rayon::prelude::*;
 
 use super::{
-    collapse::Collapse,
-    lattice::Lattices,
-    structure::{Grid, NEST_STACK, Node, NodeRef, Structure},
-    tree::{BuiltNest, Kind, Tree},
+    draft::{self, Boxes},
+    layout::{Layout, Opening, Wide},
+    structure::{Grid, Node, NodeRef, Structure},
+    tree::Tree,
 };
 use crate::{
-    Error, Job, Mesh, arena::Arena, bounds::Bounds, error, traverse::frame::Domain, triangle::Block, triangle::LANES,
+    Error, Job, Mesh,
+    arena::Arena,
+    bounds::BoundsA,
+    error,
+    simd::Level,
+    traverse::frame::Domain,
+    triangle::{Block, LANES},
 };
-
-/// Which descendants of a branch stand side by side in its wide node.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Opening {
-    /// Whichever is largest is opened first: fast.
-    Largest,
-    /// Those with which all wide nodes together have the least area.
-    Cheapest,
-}
 
 /// Pack a tree, the largest children opened first.
 ///
@@ -37,139 +35,66 @@ pub fn pack(tree: &Tree, mesh: &Mesh, job: &Job) -> Result<Structure, Error> {
 /// [`Error::Cancelled`], [`Error::OutOfMemory`].
 pub fn pack_opened(tree: &Tree, mesh: &Mesh, opening: Opening, job: &Job) -> Result<Structure, Error> {
     let domain = Domain::new(&mesh.bounds());
-    let leaves = tree.nodes.iter().filter(|node| node.kind == Kind::Leaf).count();
-    let (blocks, nodes) = (Arena::with_capacity(leaves, "the leaves")?, Arena::with_capacity(leaves, "the nodes")?);
-    let collapse = (opening == Opening::Cheapest).then(|| Collapse::new(tree)).transpose()?;
-    // What is in the cells of nests is not counted, however often it is there.
-    let items = if tree.nests.is_empty() { tree.items.len() } else { 0 };
-    let surplus = items.saturating_sub(mesh.solid_count()) as u64;
-    let (lattices, nested, centre) = (Lattices::default(), 0, domain.centre);
-    let mut packer = Packer { tree, mesh, job, centre, surplus, collapse, nodes, blocks, lattices, nested };
-    let packed = if tree.nodes.is_empty() { Packed::EMPTY } else { packer.subtree(0)? };
-    let Packer { nodes, blocks, lattices, .. } = packer;
-    let stack_size = packed.stack_size;
-    let mut structure = Structure { nodes, blocks, lattices, stack_size, ..Structure::of(packed.root, domain) };
+    let layout = Layout::of(tree, opening, job)?;
+    let nodes = write_nodes(&layout.nodes, tree, domain.centre.into(), job)?;
+    let blocks = write_leaves(&layout.leaves, mesh, job)?;
+    let stack_size = layout.stack_size;
+    let mut structure = Structure { nodes, blocks, stack_size, ..Structure::of(layout.root, domain) };
+    join_nests(tree, layout.nests, &mut structure)?;
     join_grids(tree, &mut structure)?;
     Ok(structure)
 }
 
-/// A packed subtree.
-struct Packed {
-    root: NodeRef,
-    /// Most entries a traversal of it can put on its stack.
-    stack_size: usize,
+/// Nodes or leaves that are written by one thread without a look at the job: below a millisecond.
+const PART: usize = 1 << 11;
+
+fn write_nodes(wides: &[Wide], tree: &Tree, centre: Vec3A, job: &Job) -> Result<Arena<Node>, Error> {
+    let mut nodes = Arena::stale(wides.len(), "the nodes")?;
+    nodes.par_chunks_mut(PART).zip(wides.par_chunks(PART)).try_for_each(|(nodes, wides)| {
+        job.check()?;
+        nodes.iter_mut().zip(wides).for_each(|(node, wide)| *node = fitted(wide, tree, centre));
+        Ok(())
+    })?;
+    Ok(nodes)
 }
 
-impl Packed {
-    const EMPTY: Self = Self { root: NodeRef::EMPTY, stack_size: 0 };
+fn fitted(wide: &Wide, tree: &Tree, centre: Vec3A) -> Node {
+    let bounds = std::array::from_fn(|lane| match wide.child[lane] {
+        NodeRef::EMPTY => BoundsA::EMPTY,
+        _ => tree.nodes[wide.of[lane] as usize].bounds.into(),
+    });
+    Node::new(wide.child, &bounds, centre)
 }
 
-struct Packer<'a> {
-    tree: &'a Tree,
-    mesh: &'a Mesh,
-    job: &'a Job,
-    centre: Vec3,
-    /// References beyond one a triangle, which the job does not count.
-    surplus: u64,
-    collapse: Option<Collapse<'a>>,
-    nodes: Arena<Node>,
-    blocks: Arena<Block>,
-    lattices: Lattices,
-    /// In how many nests the current subtree is.
-    nested: usize,
+/// All of the job's units for packing are counted here, whatever leaves hold: triangles may be in many of them, or in
+/// grids alone.
+fn write_leaves(leaves: &[[u32; LANES]], mesh: &Mesh, job: &Job) -> Result<Arena<Block>, Error> {
+    let mut blocks = Arena::stale(leaves.len(), "the leaves")?;
+    let (parts, units, level) = (leaves.len().div_ceil(PART), mesh.solid_count(), Level::detect());
+    let sites = blocks.par_chunks_mut(PART).zip(leaves.par_chunks(PART)).enumerate();
+    sites.try_for_each_init(Boxes::default, |boxes, (part, (blocks, leaves))| {
+        job.check()?;
+        draft::fill_all(leaves, mesh, blocks, boxes, level);
+        job.advance((units * (part + 1) / parts - units * part / parts) as u64);
+        Ok(())
+    })?;
+    if parts == 0 {
+        job.advance(units as u64);
+    }
+    Ok(blocks)
 }
 
-impl Packer<'_> {
-    fn subtree(&mut self, index: usize) -> Result<Packed, Error> {
-        let packed = match self.tree.nodes[index].kind {
-            Kind::Branch { .. } => return self.branch(index),
-            Kind::Leaf => Packed { root: self.leaf(index), stack_size: 0 },
-            Kind::Grid(grid) => Packed { root: NodeRef::grid(grid as usize), stack_size: 0 },
-            Kind::Nest(nest) => self.nest(&self.tree.nests[nest as usize])?,
-        };
-        // What is in cells is counted where the nest is: items may be in many of them.
-        if self.nested == 0 {
-            let count = u64::from(self.tree.nodes[index].count);
-            let uncounted = self.surplus.min(count);
-            self.surplus -= uncounted;
-            self.job.advance(count - uncounted);
-        }
-        Ok(packed)
+fn join_nests(tree: &Tree, mut nests: Vec<(u32, Vec<NodeRef>)>, structure: &mut Structure) -> Result<(), Error> {
+    let lattices = &mut structure.lattices;
+    let cells = nests.iter().map(|(_, cells)| cells.len()).sum();
+    lattices.children = error::reserve(cells, "the cells of nests")?;
+    nests.sort_by_key(|(nest, _)| *nest);
+    for (nest, cells) in nests {
+        let first = lattices.children.len();
+        lattices.nests.push(Grid { first, ..tree.nests[nest as usize].grid.clone() });
+        lattices.children.extend(cells);
     }
-
-    fn nest(&mut self, built: &BuiltNest) -> Result<Packed, Error> {
-        let (index, first) = (self.lattices.nests.len(), self.lattices.children.len());
-        error::grow(
-            &mut self.lattices.children,
-            first + built.grid.cell_count(),
-            NodeRef::EMPTY,
-            "the cells of nests",
-        )?;
-        self.lattices.nests.push(Grid { first, ..built.grid.clone() });
-        self.nested += 1;
-        let mut deepest = 0;
-        for &[cell, node] in &built.cells {
-            self.job.check()?;
-            let packed = self.subtree(node as usize)?;
-            self.lattices.children[first + cell as usize] = packed.root;
-            deepest = deepest.max(packed.stack_size);
-        }
-        self.nested -= 1;
-        Ok(Packed { root: NodeRef::nest(index), stack_size: NEST_STACK + deepest })
-    }
-
-    fn branch(&mut self, index: usize) -> Result<Packed, Error> {
-        if self.nodes.len().is_multiple_of(1 << 12) {
-            self.job.check()?;
-        }
-        let slot = self.nodes.len();
-        self.nodes.push(Node::EMPTY);
-        let children = self.collapse.as_ref().map_or_else(|| self.opened(index), |ways| ways.children(index));
-        let mut node = Node::EMPTY;
-        let mut deepest = 0;
-        for (lane, &child) in children.iter().enumerate() {
-            set_planes(&mut node, lane, &self.tree.nodes[child].bounds, self.centre);
-            let packed = self.subtree(child)?;
-            node.child[lane] = packed.root;
-            deepest = deepest.max(packed.stack_size);
-        }
-        node.set_order();
-        self.nodes.as_mut_slice()[slot] = node;
-        Ok(Packed { root: NodeRef::branch(slot), stack_size: children.len() - 1 + deepest })
-    }
-
-    /// Up to eight descendants that stand in for a branch: whichever is largest is opened first.
-    fn opened(&self, index: usize) -> Vec<usize> {
-        let mut open = vec![index];
-        while open.len() < LANES {
-            let area = |&(_, &child): &(usize, &usize)| self.tree.nodes[child].bounds.half_area();
-            let branches = open.iter().enumerate().filter(|(_, child)| self.tree.children(**child).is_some());
-            let Some((place, &largest)) = branches.max_by(|a, b| area(a).total_cmp(&area(b))) else {
-                break;
-            };
-            let children = self.tree.children(largest);
-            open.splice(place..=place, children.into_iter().flatten());
-        }
-        open
-    }
-
-    fn leaf(&mut self, index: usize) -> NodeRef {
-        let items = self.tree.items_of(&self.tree.nodes[index]);
-        let mut block = Block::EMPTY;
-        for (lane, item) in items.iter().enumerate() {
-            block.set(lane, item.primitive, self.mesh.corners(item.primitive));
-        }
-        self.blocks.push(block);
-        NodeRef::leaf(self.blocks.len() - 1, items.len())
-    }
-}
-
-fn set_planes(node: &mut Node, lane: usize, bounds: &Bounds, centre: Vec3) {
-    let (lower, upper) = (bounds.lower - centre, bounds.upper - centre);
-    for k in 0..3 {
-        node.plane[k][lane] = lower[k];
-        node.plane[3 + k][lane] = upper[k];
-    }
+    Ok(())
 }
 
 fn join_grids(tree: &Tree, structure: &mut Structure) -> Result<(), Error> {
