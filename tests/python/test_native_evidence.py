@@ -72,3 +72,23 @@ def test_methods_that_decide_keep_their_evidence(method: str) -> None:
     if method in {"hybrid-sampled", "hybrid-sequential"}:
         assert (decisions["depth"][0], decisions["primitives"][0]) == (0, 20_000)
         np.testing.assert_allclose([decisions["lower"][0], decisions["upper"][0]], MESH.bounds, atol=1e-6)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_hybrid_tells_what_each_builder_was_expected_to_cost(method: str) -> None:
+    choice = BUILT[method].choice()
+    if method != "hybrid":
+        assert choice == {}
+        return
+    assert sorted(choice) == ["bvh-clusters", "bvh-sah", "lazy", "lbvh"]
+    assert list(choice.values()) == sorted(choice.values())
+    assert min(choice.values()) > 0
+
+
+def test_the_more_rays_are_to_come_the_better_a_tree_is_chosen() -> None:
+    chosen = []
+    for rays in (0.0, 1e10):
+        accelerator = rt.Accelerator.build(MESH, "hybrid", {"expected_rays": rays})
+        chosen.append(next(iter(accelerator.choice())))
+        assert (accelerator.census()["lazy_cells"] > 0) == (chosen[-1] == "lazy")
+    assert chosen == ["lazy", "bvh-sah"]

@@ -208,6 +208,20 @@ impl Accelerator {
         guard(py, || decisions::to_dict(py, self.accelerator.decisions()))
     }
 
+    /// What each builder that `hybrid` chose from was expected to cost: nanoseconds of building and of tracing the rays to
+    /// come (`expected_rays` of the config), by name, the least first, which was taken. The builders are "lazy" (cells that
+    /// become hierarchies when a ray reaches them) and those of "lbvh", "bvh-clusters" and "bvh-sah", the last with grids
+    /// where they pay. Empty for other methods.
+    fn choice<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        guard(py, || {
+            let dict = PyDict::new(py);
+            for estimate in self.accelerator.choice() {
+                dict.set_item(estimate.builder.name(), estimate.nanoseconds)?;
+            }
+            Ok(dict)
+        })
+    }
+
     fn __repr__(&self) -> String {
         let mesh = self.accelerator.mesh();
         format!("Accelerator(method='{}', triangles={})", self.method(), mesh.triangles().len())

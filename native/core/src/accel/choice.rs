@@ -21,6 +21,16 @@ pub enum Builder {
 }
 
 impl Builder {
+    /// Its name, as users read it: that of the method that builds likewise, where there is one.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Lazy => "lazy",
+            Self::Linear => "lbvh",
+            Self::Clustered => "bvh-clusters",
+            Self::Complete => "bvh-sah",
+        }
+    }
+
     /// How many passes over all triangles it has less than the one with most.
     pub(super) fn passes_saved(self) -> u64 {
         match self {

@@ -63,6 +63,7 @@ pub use self::method::Method;
 use self::{
     cells::{CellFilter, Cells},
     census::Census,
+    choice::Estimate,
     config::Config,
     decision::Decision,
     grid::BuiltGrid,
@@ -96,6 +97,7 @@ pub struct Accelerator {
     structure: Structure,
     phases: Vec<PhaseTime>,
     decisions: Vec<Decision>,
+    choice: Vec<Estimate>,
     level: Level,
 }
 
@@ -107,10 +109,11 @@ impl Accelerator {
     pub fn build(mesh: Arc<Mesh>, method: Method, config: &Config, threads: usize, job: &Job) -> Result<Self, Error> {
         config.check()?;
         job.begin(Phase::Build, method.passes() * mesh.solid_count() as u64);
-        let mut builder = Builder { mesh: &mesh, config, job, phases: Vec::new(), decisions: Vec::new() };
+        let mut builder =
+            Builder { mesh: &mesh, config, job, phases: Vec::new(), decisions: Vec::new(), choice: Vec::new() };
         let structure = pool::install(threads, || builder.structure(method.recipe()))??;
-        let Builder { phases, decisions, .. } = builder;
-        Ok(Self { mesh, method, structure, phases, decisions, level: Level::detect() })
+        let Builder { phases, decisions, choice, .. } = builder;
+        Ok(Self { mesh, method, structure, phases, decisions, choice, level: Level::detect() })
     }
 
     /// The same accelerator, walked with another instruction set.
@@ -141,6 +144,12 @@ impl Accelerator {
     /// What a method that decides by evidence decided, from the root down; empty for other methods.
     pub fn decisions(&self) -> &[Decision] {
         &self.decisions
+    }
+
+    /// What each builder that a method chose from was expected to cost, the chosen one first; empty for methods that
+    /// have no choice.
+    pub fn choice(&self) -> &[Estimate] {
+        &self.choice
     }
 
     /// What the structure consists of.
@@ -192,6 +201,7 @@ struct Builder<'a> {
     job: &'a Job,
     phases: Vec<PhaseTime>,
     decisions: Vec<Decision>,
+    choice: Vec<Estimate>,
 }
 
 impl Builder<'_> {
@@ -255,7 +265,9 @@ impl Builder<'_> {
 
     fn cheapest(&mut self) -> Result<Structure, Error> {
         let triangles = self.mesh.solid_count();
-        let builder = choice::estimates(triangles, self.config)[0].builder;
+        let estimates = choice::estimates(triangles, self.config);
+        self.choice = estimates.to_vec();
+        let builder = estimates[0].builder;
         // Progress was promised for the builder that goes through all triangles most often.
         self.job.advance(builder.passes_saved() * triangles as u64);
         match builder {
