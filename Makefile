@@ -76,6 +76,9 @@ bench-grids: .venv/ready ## Measure when a grid beats a hierarchy, by content, l
 bench-paper: .venv/ready ## Measure the paper's comparison in its setting, one ray at a time [SCENES=...] [METHODS=...] [RECORD=1]
 	$(BIN)/python tests/bench/paper.py
 
+bench-totals: .venv/ready ## Measure build and trace together, the hybrid against other methods [SCENES=...] [METHODS=...] [RECORD=1]
+	$(BIN)/python tests/bench/scaling.py totals
+
 package: $(ZIP) ## Make the extension's zip in dist/, as Blender installs it
 
 clean: ## Remove everything that these commands made

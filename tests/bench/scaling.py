@@ -1,9 +1,11 @@
-"""`make bench-growth`, `make bench-threads`: how builds and traces scale with triangles and with threads.
+"""`make bench-growth`, `bench-threads`, `bench-totals`: how builds and traces scale with triangles, threads and rays.
 
 growth: build time and memory per triangle of a generated landscape of 100 thousand to 20 million triangles, and the
 greatest of each over the least. threads: one thread against two, in turns, over the benchmarks' scenes of more than
-50,000 triangles. METHODS, SCENES (threads only) and MOST (triangles, growth only) come from the environment. Write
-out/growth.json and out/threads.json; with RECORD=1 they are kept in tests/bench/record.
+50,000 triangles. totals: build and trace together for ten thousand to ten million rays of the camera, the hybrid
+against the best of other methods, in turns, on one thread. METHODS, SCENES (not of growth) and MOST (triangles, growth
+only) come from the environment. Each writes a file named like itself to out; with RECORD=1 it is kept in
+tests/bench/record, too.
 """
 
 from __future__ import annotations
@@ -35,15 +37,18 @@ ROUNDS_OF = 6_000_000
 """Rounds are as many as this many triangles allow, from 1 to 9; the least time counts."""
 FEWEST = 50_000
 """Scenes with fewer triangles are not worth a second thread."""
+COUNTS = (10_000, 100_000, 1_000_000, 10_000_000)
+"""Numbers of rays whose totals are taken."""
+TOTALED = ("hybrid", "lbvh", "bvh-clusters", "bvh-sah", "bvh-median")
+"""The hybrid, and whom it is compared with where METHODS names nobody."""
 
 
 def main() -> int:
     """Measure what the command line names; print, write, keep."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("subject", choices=["growth", "threads"])
+    parser.add_argument("subject", choices=list(SUBJECTS))
     subject = parser.parse_args().subject
-    methods = os.environ.get("METHODS", "").split() or METHODS
-    rows = growth(methods) if subject == "growth" else threads(methods)
+    rows = SUBJECTS[subject](os.environ.get("METHODS", "").split())
     about = record.header(argparse.Namespace(isa=None, threads="1, 2" if subject == "threads" else 1))
     text = json.dumps({"about": about, "rows": rows}, indent=1) + "\n"
     Path("out").mkdir(exist_ok=True)
@@ -53,8 +58,9 @@ def main() -> int:
     return 0
 
 
-def growth(methods: list[str] | tuple[str, ...]) -> list[Row]:
+def growth(named: list[str]) -> list[Row]:
     """Nanoseconds and bytes per triangle, by method and size."""
+    methods = named or METHODS
     harness.pin(1)
     rows: list[Row] = []
     most = int(os.environ.get("MOST") or TRIANGLES[-1])
@@ -92,8 +98,9 @@ def spread(rows: list[Row], method: str, what: str) -> float:
     return max(values) / min(values)
 
 
-def threads(methods: list[str] | tuple[str, ...]) -> list[Row]:
+def threads(named: list[str]) -> list[Row]:
     """Seconds of building and of tracing a million primary rays on one thread and on two, and their ratios."""
+    methods = named or METHODS
     defined = definitions.load()
     names = os.environ.get("SCENES", "").split()
     binary = harness.build()
@@ -135,6 +142,50 @@ def both(
     return times | ratios
 
 
+def totals(named: list[str]) -> list[Row]:
+    """Seconds to build and to trace so many camera rays, by scene and number, and the first method's over the others'
+    best."""
+    harness.pin(1)
+    defined, binary, methods = definitions.load(), harness.build(), named or TOTALED
+    rows: list[Row] = []
+    for scene in defined.choose_scenes(os.environ.get("SCENES", "").split()):
+        vertices, triangles = scene.mesh()
+        mesh, rays = espalier_rt.Mesh(vertices, triangles), primary_rays(defined, scene, binary)
+        for count in COUNTS:
+            times: dict[str, float] = {}
+            chosen = None
+            for _ in range(3 if count > COUNTS[-2] else 5):
+                for method in methods:
+                    took, accelerator = best(1, lambda: built_and_traced(mesh, method, count, rays))  # noqa: B023
+                    _least(times, method, took)
+                    chosen = next(iter(accelerator.choice()), chosen)
+            others = {method: took for method, took in times.items() if method != methods[0]}
+            fastest = min(others, key=others.__getitem__)
+            row = {"scene": scene.name, "triangles": len(triangles), "rays": count, "seconds": times, "chosen": chosen}
+            rows.append(row | {"best": fastest, "ratio": times[methods[0]] / others[fastest]})
+            print(
+                f"{scene.name:<20} {count:>10,} rays: {methods[0]} ({chosen}) x{rows[-1]['ratio']:.2f} of {fastest}",
+                flush=True,
+            )
+    if rows:
+        ratios = [row["ratio"] for row in rows]
+        print(f"greatest x{max(ratios):.2f}, geometric mean x{np.exp(np.log(ratios).mean()):.2f}")
+    return rows
+
+
+def built_and_traced(
+    mesh: espalier_rt.Mesh, method: str, count: int, rays: list[NDArray[np.float32]]
+) -> espalier_rt.Accelerator:
+    """An accelerator built for `count` rays, which were then traced: every so many-th of `rays`, or all repeatedly."""
+    accelerator = espalier_rt.Accelerator.build(mesh, method, {"expected_rays": count}, threads=1)
+    step = max(1, len(rays[0]) // count)
+    origins, directions = (column[::step] for column in rays)
+    for first in range(0, count, len(origins)):
+        part = slice(0, count - first)
+        accelerator.closest(origins[part], directions[part], threads=1)
+    return accelerator
+
+
 def _least(times: dict[str, float], name: str, took: float) -> None:
     times[name] = min(took, times.get(name, took))
 
@@ -148,6 +199,9 @@ def best(rounds: int, work: Callable[[], Any]) -> tuple[float, Any]:
         result = work()
         least = min(least, time.perf_counter() - start)
     return least, result
+
+
+SUBJECTS = {"growth": growth, "threads": threads, "totals": totals}
 
 
 if __name__ == "__main__":

@@ -56,7 +56,7 @@ struct Profile {
 }
 
 const PROFILES: [Profile; 4] = [
-    Profile { builder: Builder::Lazy, judge: 0.0, build: 7.5, refine: 20.0, trace: 1.1 },
+    Profile { builder: Builder::Lazy, judge: 0.0, build: 7.5, refine: 20.0, trace: 1.3 },
     Profile { builder: Builder::Linear, judge: 0.0, build: 8.0, refine: 0.0, trace: 1.2 },
     Profile { builder: Builder::Clustered, judge: 0.0, build: 30.0, refine: 0.0, trace: 1.05 },
     // The rays that judge its nodes are as many for a small mesh as for a large one.
