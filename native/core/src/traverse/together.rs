@@ -1,6 +1,8 @@
 //! Batches whose rays walk together: in streams, sorted by the grid over the rays, or, where they start at one point,
 //! in tiles.
 
+use std::time::Instant;
+
 use super::{
     Tracer,
     answers::Answers,
@@ -125,7 +127,7 @@ impl<'a, T: Take + ?Sized, const ANY: bool> Together<'a, T, ANY> {
         if !self.trial.wants_tiles() || !self.rays.is_common_origin(first) {
             return 0;
         }
-        let start = self.trial.start();
+        let start = Instant::now();
         let taken = tile.gather(simd, self.rays, first, &structure.domain);
         if taken == 0 {
             self.ripe = first + UNRIPE;
