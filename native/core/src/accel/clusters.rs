@@ -3,9 +3,9 @@
 //! for Bounding Volume Hierarchy Construction", TVCG 24(3), 2018; as its distance, the area of the box around both.
 //!
 //! Measured against the surface area heuristic over single triangles, by steps of a ray: from the camera 15% fewer to 3%
-//! more (Sponza and Sibenik fewer; bunny, dragon, city, hair), after a bounce 7% fewer to 3% more. Fetching the corners, which
-//! miss the cache, is two thirds of the time of clustering; fetching them in a loop of their own did not help, nor did
-//! comparing with 8 neighbours to either side instead of 15.
+//! more (Sponza and Sibenik fewer; bunny, dragon, city, hair), after a bounce 7% fewer to 3% more. Fetching the corners,
+//! which miss the cache, is two thirds of the time of clustering; fetching them in a loop of their own did not help, nor
+//! did comparing with 8 neighbours to either side instead of 15.
 
 use rayon::prelude::*;
 
@@ -35,8 +35,8 @@ const CELL: usize = 4;
 /// A cell ends where the box around it would have more than this many times the area of its clusters together.
 const CELL_GROWTH: f32 = 1.0;
 
-/// Nor more than this many times that of its smallest cluster: in the box of a large one a small one counts as large, and
-/// no plane can tell any more where it is. Without this bound, halls whose walls are few and whose ornaments are many
+/// Nor more than this many times that of its smallest cluster: in the box of a large one a small one counts as large,
+/// and no plane can tell any more where it is. Without this bound, halls whose walls are few and whose ornaments are many
 /// (Sponza, Sibenik) make 7 to 36% more steps; up to 16 times it is as good there, but not in Sibenik.
 const CELL_SHARE: f32 = 4.0;
 
