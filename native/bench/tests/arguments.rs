@@ -12,7 +12,10 @@ fn refused(arguments: &[&str]) -> String {
 fn unknown_ones_are_told_with_the_known() {
     for arguments in [&[][..], &["run", "plan.json"], &["race"]] {
         let message = refused(arguments);
-        assert!(message.starts_with("espalier-bench: ") && message.contains("race PLAN, hits PLAN"), "{message}");
+        assert!(
+            message.starts_with("espalier-bench: ") && message.contains("race PLAN, turns PLAN, hits PLAN"),
+            "{message}"
+        );
     }
 }
 
