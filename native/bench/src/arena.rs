@@ -215,16 +215,16 @@ fn done<T>((time, made): (Duration, Result<T, Error>)) -> Result<Duration, Error
 /// [`Error::Core`].
 pub fn trace_ours(
     ours: &Accelerator,
-    rays: &RayColumns,
+    columns: &RayColumns,
     class: &Class,
     threads: usize,
     answer: &mut Answer,
 ) -> Result<(), Error> {
-    let (job, rays) = (Job::new(), rays.rays());
+    let (job, rays) = (Job::new(), columns.rays());
     let batch = if class.kind == Kind::Single { Some(1) } else { class.batch.map(NonZero::get) };
     match (class.query, batch) {
         (Query::Closest, None) => ours.closest(&rays, answer.hits.as_mut(), threads, &job)?,
-        (Query::Closest, Some(1)) => one_by_one(ours, &rays, threads, &mut answer.hits)?,
+        (Query::Closest, Some(1)) => one_by_one(ours, columns, threads, &mut answer.hits)?,
         (Query::Closest, Some(size)) => in_calls(ours, &rays, size, threads, &mut answer.hits)?,
         (Query::Any, None) => ours.occluded(&rays, &mut answer.blocked, threads, &job)?,
         (Query::Any, Some(_)) => return Err(Error::Plan("rays in batches are closest-hit queries".into())),
@@ -249,7 +249,7 @@ fn in_calls(
 /// Every ray by a call of its own.
 fn one_by_one(
     ours: &Accelerator,
-    rays: &Rays<'_>,
+    rays: &RayColumns,
     threads: usize,
     hits: &mut Hits,
 ) -> Result<(), espalier_core::Error> {

@@ -1,7 +1,10 @@
 //! The rays of the classes. Every one is a function of mesh, camera, seed and pixel, to the bit, on every machine: the
 //! arithmetic is in double precision and uses nothing but what IEEE 754 rounds exactly.
 
-use espalier_core::{Column, Hits, Mesh, Rays, ray::MISS};
+use espalier_core::{
+    Column, Hits, Mesh, Rays,
+    ray::{MISS, Ray},
+};
 use glam::{DVec2, DVec3, Vec3};
 
 use crate::camera::Camera;
@@ -29,6 +32,18 @@ impl RayColumns {
     /// How many rays there are.
     pub fn len(&self) -> usize {
         self.columns[0].len()
+    }
+
+    /// One of them.
+    #[inline]
+    pub fn get(&self, index: usize) -> Ray {
+        let [ox, oy, oz, dx, dy, dz, tmin, tmax] = &self.columns;
+        Ray {
+            origin: Vec3::new(ox[index], oy[index], oz[index]),
+            direction: Vec3::new(dx[index], dy[index], dz[index]),
+            tmin: tmin[index],
+            tmax: tmax[index],
+        }
     }
 
     /// As Espalier takes them.

@@ -114,7 +114,10 @@ impl<T: Pod> Deref for Arena<T> {
 
     #[inline]
     fn deref(&self) -> &[T] {
-        self.map.as_ref().map_or(&[], |map| bytemuck::cast_slice(&map[..self.len * size_of::<T>()]))
+        match &self.map {
+            Some(map) => bytemuck::cast_slice(&map[..self.len * size_of::<T>()]),
+            None => &[],
+        }
     }
 }
 

@@ -156,10 +156,8 @@ impl Mesh {
     /// The three corners of a triangle.
     #[inline(always)]
     pub fn corners(&self, triangle: u32) -> [Vec3; 3] {
-        let first = 3 * triangle as usize;
-        let ([a, b, c], numbers) = (three(&self.indices[first..first + 3]), &self.numbers[..]);
-        let vertex = |index: u32| Vec3::from_array(three(&numbers[3 * index as usize..3 * index as usize + 3]));
-        [vertex(a), vertex(b), vertex(c)]
+        let [a, b, c] = self.reader().places(triangle);
+        [Vec3::from_array(*a), Vec3::from_array(*b), Vec3::from_array(*c)]
     }
 
     /// For those who go through many triangles.
@@ -180,12 +178,7 @@ impl Mesh {
     }
 }
 
-#[inline(always)]
-fn three<T: Copy>(values: &[T]) -> [T; 3] {
-    [values[0], values[1], values[2]]
-}
-
-/// A mesh's triangles at hand, in aligned vectors.
+/// A mesh's triangles at hand.
 #[derive(Clone, Copy)]
 pub struct Reader<'a> {
     triangles: &'a [[u32; 3]],
@@ -193,7 +186,19 @@ pub struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    /// The three corners of a triangle.
+    /// Where the three corners of a triangle stand.
+    #[inline(always)]
+    pub fn places(&self, triangle: u32) -> [&'a [f32; 3]; 3] {
+        let [a, b, c] = self.triangles[triangle as usize];
+        [self.place(a), self.place(b), self.place(c)]
+    }
+
+    #[inline(always)]
+    fn place(&self, vertex: u32) -> &'a [f32; 3] {
+        self.numbers[3 * vertex as usize..].first_chunk().expect("a vertex has three coordinates")
+    }
+
+    /// The three corners of a triangle, in aligned vectors.
     #[inline(always)]
     pub fn corners(&self, triangle: u32) -> [Vec3A; 3] {
         let [a, b, c] = self.triangles[triangle as usize];

@@ -48,7 +48,13 @@ impl Block {
     /// The corners in a lane.
     #[inline(always)]
     pub(crate) fn corners(&self, lane: usize) -> [[f32; 3]; 3] {
-        self.corner.map(|corner| corner.map(|axis| axis[lane]))
+        let mut corners = [[0.0; 3]; 3];
+        for c in 0..3 {
+            for k in 0..3 {
+                corners[c][k] = self.corner[c][k][lane];
+            }
+        }
+        corners
     }
 
     /// The exact test of one lane. Few tests are left to it.
@@ -62,7 +68,7 @@ impl Block {
 /// Where a ray meets a triangle, in the frame's units, if it does so within the frame's interval.
 #[inline(always)]
 pub fn intersect(frame: &Frame, corners: [[f32; 3]; 3], primitive: u32) -> Option<Hit> {
-    let [a, b, c] = corners.map(|corner| shear(frame, corner));
+    let [a, b, c] = sheared(frame, corners.each_ref());
     let (u, v, w) = (edge(c, b), edge(a, c), edge(b, a));
     let inside = sign(u, b, c);
     if inside != sign(v, c, a) || inside != sign(w, a, b) {
@@ -77,8 +83,8 @@ pub fn intersect(frame: &Frame, corners: [[f32; 3]; 3], primitive: u32) -> Optio
 
 /// Where a ray meets a triangle that it is known to meet, in the frame's units: what [`intersect`] says, to the bit.
 #[inline(always)]
-pub fn evaluate(frame: &Frame, corners: [[f32; 3]; 3], primitive: u32) -> Hit {
-    let [a, b, c] = corners.map(|corner| shear(frame, corner));
+pub fn evaluate(frame: &Frame, corners: [&[f32; 3]; 3], primitive: u32) -> Hit {
+    let [a, b, c] = sheared(frame, corners);
     weigh(frame, [edge(c, b), edge(a, c), edge(b, a)], [a[2], b[2], c[2]], primitive)
 }
 
@@ -91,15 +97,21 @@ fn weigh(frame: &Frame, [u, v, w]: [f64; 3], [a, b, c]: [f64; 3], primitive: u32
     Hit { t, primitive, u: (v / determinant) as f32, v: (w / determinant) as f32 }
 }
 
+#[inline(always)]
+fn sheared(frame: &Frame, [a, b, c]: [&[f32; 3]; 3]) -> [[f64; 3]; 3] {
+    [shear(frame, a), shear(frame, b), shear(frame, c)]
+}
+
 /// A corner in sheared space. x and y are rounded to single precision step by step, in the order the vector filter
 /// rounds them, so that the filter and this test see the same point.
 #[inline(always)]
-fn shear(frame: &Frame, corner: [f32; 3]) -> [f64; 3] {
-    let [kx, ky, kz] = frame.axes.map(|axis| axis as usize);
-    let p: [f32; 3] = std::array::from_fn(|k| corner[k] - frame.origin[k]);
-    let x = p[kx] - frame.shear[0] * p[kz];
-    let y = p[ky] - frame.shear[1] * p[kz];
-    [f64::from(x), f64::from(y), f64::from(p[kz])]
+fn shear(frame: &Frame, corner: &[f32; 3]) -> [f64; 3] {
+    let along = |axis: u32| corner[axis as usize] - frame.origin[axis as usize];
+    let [kx, ky, kz] = frame.axes;
+    let z = along(kz);
+    let x = along(kx) - frame.shear[0] * z;
+    let y = along(ky) - frame.shear[1] * z;
+    [f64::from(x), f64::from(y), f64::from(z)]
 }
 
 /// Twice the signed area of the triangle of the origin, `p` and `q`, in x and y.

@@ -1,7 +1,7 @@
 //! The exact hits of rays whose triangle is known, eight at once.
 
 use super::{exact::Exact, frame::Frame};
-use crate::{Mesh, ray::Hit, simd::Simd, triangle::LANES};
+use crate::{mesh::Reader, ray::Hit, simd::Simd, triangle::LANES};
 
 /// Up to eight rays, and the triangle that each is known to hit.
 pub struct Answers {
@@ -26,8 +26,8 @@ impl Answers {
 
     /// Add a ray, by whatever name it has; there must be room.
     #[inline(always)]
-    pub fn push(&mut self, slot: usize, frame: &Frame, mesh: &Mesh, primitive: u32) {
-        let (lane, corners) = (self.count, mesh.corners(primitive));
+    pub fn push(&mut self, slot: usize, frame: &Frame, mesh: Reader<'_>, primitive: u32) {
+        let (lane, corners) = (self.count, mesh.places(primitive));
         for k in 0..3 {
             let axis = frame.axes[k] as usize;
             for c in 0..3 {

@@ -7,7 +7,7 @@ use super::{
     kernel::{self, Entry},
     pace::Pace,
     probe::{Counts, Probe},
-    single::One,
+    single::{One, Scene},
     stream::{Bin, Lists},
     tile::{Tile, Visit},
     together::{Take, Together},
@@ -75,10 +75,14 @@ impl<'a> Tracer<'a> {
             if rays.len() >= LEAST_STREAM {
                 return self.level.run(Together::<_, ANY>::new(self, rays, to, room, pace));
             }
+            let scene = Scene::new(self);
             for index in 0..rays.len() {
-                let (ray, stack) = (rays.get(index), &mut room.stack);
-                let hit = self.level.run(One::<ANY> { tracer: self, ray: &ray, stack });
-                to.take(index, hit.ok_or_else(|| rays.fault(index))?);
+                let (ray, stack) = (rays.get(index), &mut *room.stack);
+                let hit = self.level.run(One::<ANY> { scene: &scene, ray: &ray, stack });
+                if hit.t.is_nan() {
+                    return Err(rays.fault(index));
+                }
+                to.take(index, hit);
             }
             Ok(())
         })
@@ -134,11 +138,12 @@ impl<F: FnMut(usize, &Frame, Hit, P), P: Probe + Default> Singles<'_, F, P> {
     #[inline(always)]
     fn each<S: Simd, const GRIDS: bool>(mut self, simd: S) -> Result<(), Error> {
         let Tracer { structure, mesh, .. } = self.tracer;
+        let scene = (structure, structure.view());
         for index in 0..self.rays.len() {
             let frame = self.rays.frame(index, &structure.domain)?;
             let mut probe = P::default();
             let stack = &mut self.room.stack;
-            let hit = kernel::trace::<S, P, GRIDS, false>(simd, structure, mesh, &frame, stack, &mut probe);
+            let hit = kernel::trace::<S, P, GRIDS, false>(simd, scene, mesh, &frame, stack, &mut probe);
             (self.take)(index, &frame, hit, probe);
         }
         Ok(())

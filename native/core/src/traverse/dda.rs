@@ -66,28 +66,30 @@ impl Walk {
     /// In the cell where the ray is at `enter`.
     #[inline(always)]
     pub fn new(frame: &Frame, grid: &Grid, enter: f32) -> Self {
-        let cell = std::array::from_fn(|k| {
+        let mut cell = [0; 3];
+        for k in 0..3 {
             let position = frame.local[k] + frame.direction[k] * enter;
             // Towards zero, which differs from the floor only below the first cell.
-            (((position - grid.lower[k]) * grid.inverse_cell[k]) as i32).clamp(0, grid.resolution[k] as i32 - 1)
-        });
+            let place = ((position - grid.lower[k]) * grid.inverse_cell[k]) as i32;
+            cell[k] = place.clamp(0, grid.resolution[k] as i32 - 1);
+        }
         Self::at(cell, frame, grid)
     }
 
     /// In a cell.
     #[inline(always)]
     pub fn at(cell: [i32; 3], frame: &Frame, grid: &Grid) -> Self {
-        let resolution = grid.resolution.map(|r| r as i32);
-        let step = frame.inverse.map(|inverse| if inverse < 0.0 { -1 } else { 1 });
-        let rows = [1, resolution[0] as isize, resolution[0] as isize * resolution[1] as isize];
-        let mut walk = Self {
-            index: (0..3).map(|k| cell[k] as isize * rows[k]).sum(),
-            cell,
-            step,
-            stride: std::array::from_fn(|k| rows[k] * step[k] as isize),
-            crossing: [0.0; 3],
-        };
-        walk.crossing = std::array::from_fn(|k| walk.crossing(k, frame, grid));
+        let [columns, rows, _] = grid.resolution;
+        let strides = [1, columns as isize, columns as isize * rows as isize];
+        let mut walk = Self { index: 0, cell, step: [1; 3], stride: strides, crossing: [0.0; 3] };
+        for k in 0..3 {
+            walk.index += cell[k] as isize * strides[k];
+            if frame.inverse[k] < 0.0 {
+                walk.step[k] = -1;
+                walk.stride[k] = -strides[k];
+            }
+            walk.crossing[k] = walk.crossing(k, frame, grid);
+        }
         walk
     }
 

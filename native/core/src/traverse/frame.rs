@@ -90,11 +90,19 @@ impl Frame {
     /// The frame of a ray, or `None` where the ray is not a number, not finite, or has no direction.
     #[inline(always)]
     pub fn new(ray: &Ray, domain: &Domain) -> Option<Self> {
+        let mut frame = Self::zeroed();
+        frame.set(ray, domain).then_some(frame)
+    }
+
+    /// Become what [`Frame::new`] gives; false where there is none, and the frame is then unspecified. In place: copies
+    /// of a frame that was written number by number wait for all of the numbers.
+    #[inline(always)]
+    pub(super) fn set(&mut self, ray: &Ray, domain: &Domain) -> bool {
         let largest = ray.direction.abs().max_element();
         // Zero times anything finite is zero; times anything else it is not a number.
         let finite = (ray.origin * 0.0 + ray.direction * 0.0).element_sum() == 0.0;
         if !finite || largest < 1e-37 || ray.tmin.partial_cmp(&ray.tmax).is_none() {
-            return None;
+            return false;
         }
         let exponent = largest.to_bits() >> 23;
         let power = |exponent: u32| f32::from_bits(exponent << 23);
@@ -103,52 +111,53 @@ impl Frame {
         let local = ray.origin - domain.centre;
         let reach = local.abs().max_element();
         if reach > NEAR * domain.half_extent {
-            return Some(Self::from_afar(ray, direction, domain, scale));
+            self.set_from_afar(ray, direction, domain, scale);
+            return true;
         }
         let interval = (ray.tmin * length, ray.tmax * length);
-        Some(Self { scale, ..Self::near(ray.origin, local, reach, direction, interval, domain) })
+        self.set_near(ray.origin, local, reach, direction, interval, domain);
+        self.scale = scale;
+        true
     }
 
-    /// The frame of a ray whose origin is near; `local` is it relative to the centre, `reach` the largest component of
-    /// that, and direction and interval are scaled already.
+    /// Become the frame of a ray whose origin is near; `local` is it relative to the centre, `reach` the largest
+    /// component of that, and direction and interval are scaled already.
     #[inline(always)]
-    pub(super) fn near(
+    pub(super) fn set_near(
+        &mut self,
         origin: Vec3,
         local: Vec3,
         reach: f32,
         direction: Vec3,
         (tmin, tmax): (f32, f32),
         domain: &Domain,
-    ) -> Self {
+    ) {
         let margin = DILATION * (reach + domain.half_extent) + f32::MIN_POSITIVE;
         let parallel = direction.abs().cmplt(Vec3::splat(PARALLEL));
         let inverse = Vec3::select(parallel, Vec3::splat(PARALLEL).copysign(direction), direction).recip();
         let (bias, slack) = (-local * inverse, inverse.abs() * margin);
-        let axes = dominant_last(direction);
-        let (d, inverse) = (direction.to_array(), inverse.to_array());
-        let steepness = inverse[axes[2] as usize];
-        Self {
-            inverse,
-            near_bias: (bias - slack).to_array(),
-            far_bias: (bias + slack).to_array(),
-            tmin,
-            tmax,
-            local: local.to_array(),
-            advance: 0.0,
-            origin: origin.to_array(),
-            shear: [d[axes[0] as usize] * steepness, d[axes[1] as usize] * steepness],
-            axes,
-            direction: d,
-            scale: 1.0,
-            unused: [0.0; 4],
-        }
+        self.inverse = inverse.to_array();
+        self.near_bias = (bias - slack).to_array();
+        self.far_bias = (bias + slack).to_array();
+        self.tmin = tmin;
+        self.tmax = tmax;
+        self.local = local.to_array();
+        self.advance = 0.0;
+        self.origin = origin.to_array();
+        self.direction = direction.to_array();
+        self.axes = dominant_last(direction);
+        self.scale = 1.0;
+        let [x, y, steepest] = self.axes.map(|axis| axis as usize);
+        let steepness = self.inverse[steepest];
+        self.shear = [self.direction[x] * steepness, self.direction[y] * steepness];
     }
 
-    /// The frame of a ray whose origin is far, begun two half extents before the closest approach to the scene's
+    /// Become the frame of a ray whose origin is far, begun two half extents before the closest approach to the scene's
     /// centre. A ray that meets the scene's bounding sphere (radius at most √3 half extents) is then within √7 half
     /// extents of the centre; of one that does not, the interval is made empty.
     #[cold]
-    fn from_afar(ray: &Ray, direction: Vec3, domain: &Domain, scale: f32) -> Self {
+    #[inline(never)]
+    fn set_from_afar(&mut self, ray: &Ray, direction: Vec3, domain: &Domain, scale: f32) {
         let (o, d) = (ray.origin.as_dvec3(), direction.as_dvec3());
         let to_centre: DVec3 = domain.centre.as_dvec3() - o;
         let advance = to_centre.dot(d) / d.length_squared() - 2.0 * f64::from(domain.half_extent) / d.length();
@@ -157,11 +166,14 @@ impl Frame {
         let reach = local.abs().max_element();
         if reach > NEAR * domain.half_extent {
             let nowhere = (f32::INFINITY, f32::NEG_INFINITY);
-            return Self::near(domain.centre, Vec3::ZERO, 0.0, direction, nowhere, domain);
+            self.set_near(domain.centre, Vec3::ZERO, 0.0, direction, nowhere, domain);
+            return;
         }
         let shifted = |t: f32| (f64::from(t) / f64::from(scale) - advance) as f32;
         let interval = (shifted(ray.tmin), shifted(ray.tmax));
-        Self { scale, advance, ..Self::near(origin, local, reach, direction, interval, domain) }
+        self.set_near(origin, local, reach, direction, interval, domain);
+        self.scale = scale;
+        self.advance = advance;
     }
 
     /// Where the ray enters a dilated box, given relative to the centre of the domain, if it does before `limit`.
@@ -205,5 +217,6 @@ fn dominant_last(direction: Vec3) -> [u32; 3] {
     let a = direction.abs();
     let x = (a.x >= a.y) & (a.x >= a.z);
     let last = if x { 0 } else { 2 - u32::from(a.y >= a.z) };
-    [[1, 2, 0], [2, 0, 1], [0, 1, 2]][last as usize]
+    const AXES: &[[u32; 3]; 3] = &[[1, 2, 0], [2, 0, 1], [0, 1, 2]];
+    AXES[last as usize]
 }

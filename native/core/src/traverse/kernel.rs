@@ -76,18 +76,19 @@ impl<S: Simd> Planes<S> {
     }
 }
 
-/// The first hit along the ray in the frame's units, or, where `ANY`, some hit. `GRIDS` tells that the structure has grids.
+/// The first hit along the ray in the frame's units, or, where `ANY`, some hit. `view` is the structure's own, and
+/// `GRIDS` tells that it has grids.
 #[inline(always)]
 pub fn trace<S: Simd, P: Probe, const GRIDS: bool, const ANY: bool>(
     simd: S,
-    structure: &Structure,
+    (structure, view): (&Structure, View<'_>),
     mesh: &Mesh,
     frame: &Frame,
     stack: &mut [Entry],
     probe: &mut P,
 ) -> Hit {
     let mut search = Search { simd, frame, mesh, probe, best: Best::none(frame.tmax) };
-    trace_below::<S, P, GRIDS, ANY>(&mut search, structure, (structure.view(), structure.root), stack);
+    trace_below::<S, P, GRIDS, ANY>(&mut search, structure, (view, structure.root), stack);
     search.best.answer::<ANY>(frame, mesh)
 }
 

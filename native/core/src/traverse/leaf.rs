@@ -43,7 +43,7 @@ impl Best {
         if self.primitive == MISS {
             return Hit::MISS;
         }
-        triangle::evaluate(frame, corners(mesh, self.primitive), self.primitive)
+        triangle::evaluate(frame, mesh.reader().places(self.primitive), self.primitive)
     }
 
     /// Which of two hits whose intervals overlap comes first.
@@ -58,11 +58,6 @@ impl Best {
     fn evaluated(self, frame: &Frame, mesh: &Mesh) -> Self {
         Self::exactly(&self.hit(frame, mesh))
     }
-}
-
-#[inline(always)]
-pub fn corners(mesh: &Mesh, triangle: u32) -> [[f32; 3]; 3] {
-    mesh.corners(triangle).map(|corner| corner.to_array())
 }
 
 /// The best hit so far, and the ray it belongs to.

@@ -69,15 +69,27 @@ fn shear<S: Simd>(simd: S, direction: [S::F32; 3], inverse: [S::F32; 3]) -> ([S:
     let [x, y, z] = direction;
     let size = [simd.abs(x), simd.abs(y), simd.abs(z)];
     let greatest = simd.max(simd.max(size[1], size[2]), size[0]);
-    let axis = [0, 1, 2].map(f32::from_bits).map(|bits| simd.splat(bits));
-    let choose = |of_x, of_y, of_z| {
-        let others = simd.if_ge(size[1], size[2], of_y, of_z);
-        simd.if_ge(size[0], greatest, of_x, others)
-    };
-    let axes =
-        [choose(axis[1], axis[2], axis[0]), choose(axis[2], axis[0], axis[1]), choose(axis[0], axis[1], axis[2])];
-    let steepness = choose(inverse[0], inverse[1], inverse[2]);
-    (axes, [simd.mul(choose(y, z, x), steepness), simd.mul(choose(z, x, y), steepness)])
+    let sizes = [size[0], greatest, size[1], size[2]];
+    let (zero, one, two) = (bits(simd, 0), bits(simd, 1), bits(simd, 2));
+    let axes = [
+        choose(simd, sizes, [one, two, zero]),
+        choose(simd, sizes, [two, zero, one]),
+        choose(simd, sizes, [zero, one, two]),
+    ];
+    let steepness = choose(simd, sizes, inverse);
+    let shear = [choose(simd, sizes, [y, z, x]), choose(simd, sizes, [z, x, y])];
+    (axes, [simd.mul(shear[0], steepness), simd.mul(shear[1], steepness)])
+}
+
+/// The first where the size of x is the greatest, else the second where that of y is at least that of z, else the third.
+#[inline(always)]
+fn choose<S: Simd>(simd: S, [x, greatest, y, z]: [S::F32; 4], [of_x, of_y, of_z]: [S::F32; 3]) -> S::F32 {
+    simd.if_ge(x, greatest, of_x, simd.if_ge(y, z, of_y, of_z))
+}
+
+#[inline(always)]
+fn bits<S: Simd>(simd: S, bits: u32) -> S::F32 {
+    simd.splat(f32::from_bits(bits))
 }
 
 #[cfg(test)]

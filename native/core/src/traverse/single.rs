@@ -1,5 +1,7 @@
 //! Rays that walk alone.
 
+use bytemuck::Zeroable;
+
 use super::{
     Tracer,
     frame::Frame,
@@ -7,7 +9,8 @@ use super::{
     probe::Silent,
 };
 use crate::{
-    Error,
+    Error, Mesh,
+    accel::structure::{Structure, View},
     ray::{Hit, Ray},
     simd::{Kernel, Simd},
 };
@@ -16,13 +19,14 @@ use crate::{
 #[derive(Debug)]
 pub struct Walker<'a> {
     tracer: Tracer<'a>,
+    scene: Scene<'a>,
     stack: Vec<Entry>,
 }
 
 impl<'a> Tracer<'a> {
     /// For one ray at a call.
     pub fn walker(self) -> Walker<'a> {
-        Walker { tracer: self, stack: vec![Entry::NONE; self.structure.stack_size] }
+        Walker { tracer: self, scene: Scene::new(self), stack: vec![Entry::NONE; self.structure.stack_size] }
     }
 }
 
@@ -33,24 +37,42 @@ impl Walker<'_> {
     /// [`Error::Ray`] where the ray is unusable.
     #[inline]
     pub fn first(&mut self, ray: &Ray) -> Result<Hit, Error> {
-        let one = One::<false> { tracer: self.tracer, ray, stack: &mut self.stack };
-        self.tracer.level.run(one).ok_or_else(|| ray.fault(0))
+        let hit = self.tracer.level.run(One::<false> { scene: &self.scene, ray, stack: &mut self.stack });
+        if hit.t.is_nan() { Err(ray.fault(0)) } else { Ok(hit) }
     }
 }
 
-/// A ray that walks alone; its hit, or nothing where it is unusable.
+/// What a tracer's rays need again and again, looked up once.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Scene<'a> {
+    structure: &'a Structure,
+    mesh: &'a Mesh,
+    view: View<'a>,
+    has_grids: bool,
+}
+
+impl<'a> Scene<'a> {
+    /// Of a tracer.
+    pub fn new(tracer: Tracer<'a>) -> Self {
+        let Tracer { structure, mesh, .. } = tracer;
+        Self { structure, mesh, view: structure.view(), has_grids: structure.has_grids() }
+    }
+}
+
+/// A ray that walks alone; its hit, whose parameter is not a number where the ray is unusable: a hit goes through
+/// registers, an optional one through memory (a tenth of the time of a ray that misses).
 pub(super) struct One<'a, const ANY: bool> {
-    pub tracer: Tracer<'a>,
+    pub scene: &'a Scene<'a>,
     pub ray: &'a Ray,
     pub stack: &'a mut [Entry],
 }
 
 impl<const ANY: bool> Kernel for One<'_, ANY> {
-    type Output = Option<Hit>;
+    type Output = Hit;
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> Self::Output {
-        match self.tracer.structure.has_grids() {
+        match self.scene.has_grids {
             false => self.each::<S, false>(simd),
             true => self.each::<S, true>(simd),
         }
@@ -59,10 +81,14 @@ impl<const ANY: bool> Kernel for One<'_, ANY> {
 
 impl<const ANY: bool> One<'_, ANY> {
     #[inline(always)]
-    fn each<S: Simd, const GRIDS: bool>(self, simd: S) -> Option<Hit> {
-        let Tracer { structure, mesh, .. } = self.tracer;
-        let frame = Frame::new(self.ray, &structure.domain)?;
-        let hit = kernel::trace::<S, Silent, GRIDS, ANY>(simd, structure, mesh, &frame, self.stack, &mut Silent);
-        Some(frame.in_ray_units(hit))
+    fn each<S: Simd, const GRIDS: bool>(self, simd: S) -> Hit {
+        let &Scene { structure, mesh, view, .. } = self.scene;
+        let mut frame = Frame::zeroed();
+        if !frame.set(self.ray, &structure.domain) {
+            return Hit { t: f32::NAN, ..Hit::MISS };
+        }
+        let scene = (structure, view);
+        let hit = kernel::trace::<S, Silent, GRIDS, ANY>(simd, scene, mesh, &frame, self.stack, &mut Silent);
+        frame.in_ray_units(hit)
     }
 }

@@ -198,13 +198,19 @@ fn branch<S: Simd, const ANY: bool>(
     let (start, mut end) = (ids.start, ids.start + padded);
     lists.make_room(end + LANES * padded);
     let planes = OctantPlanes::new(simd, node, octant);
+    // Eight masks are written at once: read eightfold soon after, single bytes would have to be waited for.
     let mut any = 0;
-    for (mask, &id) in lists.masks.iter_mut().zip(&lists.ids[ids.clone()]) {
-        let met = planes.meet(simd, &frames[id as usize]);
-        *mask = met as u8;
-        any |= met;
+    lists.masks[ids.len().next_multiple_of(LANES)..padded].fill(0);
+    let (masks, _) = lists.masks.as_chunks_mut();
+    for (masks, ids) in masks.iter_mut().zip(lists.ids[ids].chunks(LANES)) {
+        let mut word = 0;
+        for (lane, &id) in ids.iter().enumerate() {
+            let met = planes.meet(simd, &frames[id as usize]);
+            word |= u64::from(met) << (8 * lane);
+            any |= met;
+        }
+        *masks = word.to_le_bytes();
     }
-    lists.masks[ids.len()..padded].fill(0);
     let leaves = if ANY { node.leaves() } else { 0 };
     for mut rest in [any & !leaves, any & leaves] {
         let mut order = node.order[octant];

@@ -145,22 +145,25 @@ impl<'a, T: Take + ?Sized, const ANY: bool> Together<'a, T, ANY> {
     #[inline(always)]
     fn answer<S: Simd>(&mut self, simd: S) {
         let Room { bin, waiting, .. } = &*self.room;
-        if !ANY {
-            bin.warm(simd, self.tracer.mesh);
+        let mesh = self.tracer.mesh.reader();
+        if ANY {
+            for slot in 0..bin.len() {
+                let (place, _, best) = bin.ray(slot);
+                self.to.take(waiting.index(place), Hit { primitive: best.primitive, ..Hit::MISS });
+            }
+            return;
         }
+        bin.warm(simd, self.tracer.mesh);
         let (mut answers, mut slot) = (Answers::EMPTY, 0);
         while slot < bin.len() {
             while slot < bin.len() && !answers.is_full() {
                 let (place, frame, best) = bin.ray(slot);
-                if ANY || best.primitive == MISS {
-                    self.to.take(waiting.index(place), Hit { primitive: best.primitive, ..Hit::MISS });
+                if best.primitive == MISS {
+                    self.to.take(waiting.index(place), Hit::MISS);
                 } else {
-                    answers.push(slot, frame, self.tracer.mesh, best.primitive);
+                    answers.push(slot, frame, mesh, best.primitive);
                 }
                 slot += 1;
-            }
-            if ANY {
-                continue;
             }
             let (hits, count) = answers.take(simd);
             for &(slot, hit) in &hits[..count] {

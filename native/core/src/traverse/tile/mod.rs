@@ -149,7 +149,7 @@ fn push(tile: &Tile, boxes: &Boxes, child: &[NodeRef; LANES], order: u32, groups
         let lane = (order & 7) as usize;
         order >>= 3;
         if boxes.met >> lane & 1 == 1 && boxes.near[lane] <= tile.far {
-            let [low, high] = [boxes.low, boxes.high].map(|sides| [sides[0][lane], sides[1][lane]]);
+            let (low, high) = ([boxes.low[0][lane], boxes.low[1][lane]], [boxes.high[0][lane], boxes.high[1][lane]]);
             visits.push(Visit { node: child[lane], groups, near: boxes.near[lane], low, high });
         }
     }

@@ -183,7 +183,8 @@ impl Tile {
             elsewhere = simd.add(elsewhere, simd.mul(direction[k], zero));
             largest = simd.max(simd.abs(direction[k]), largest);
         }
-        let [x, y, z] = self.axes.map(|axis| direction[axis]);
+        let [x, y, z] = self.axes;
+        let [x, y, z] = [direction[x], direction[y], direction[z]];
         let (tmin, tmax) = (simd.load(&columns[6]), simd.load(&columns[7]));
         let rise = simd.mul(z, simd.splat(self.sign));
         let fits = simd.le(elsewhere, zero)
@@ -240,7 +241,8 @@ impl Tile {
             }
             let groups = &mut self.groups[first..self.count.min(first + LANES)];
             for (lane, group) in groups.iter_mut().enumerate() {
-                group.set_middle([0, 1].map(|k| (spans.low[k][lane], spans.high[k][lane])));
+                let ([a, b], [c, d]) = (&spans.low, &spans.high);
+                group.set_middle([(a[lane], c[lane]), (b[lane], d[lane])]);
                 spans.far[lane] = greatest(&group.high);
             }
         }
@@ -290,7 +292,10 @@ impl Tile {
     /// Find the farthest hit again.
     #[inline(always)]
     pub fn update_far(&mut self) {
-        self.far = self.spans.iter().fold(f32::NEG_INFINITY, |far, spans| far.max(greatest(&spans.far)));
+        self.far = f32::NEG_INFINITY;
+        for spans in &self.spans {
+            self.far = self.far.max(greatest(&spans.far));
+        }
     }
 
     /// The frame of a ray.
@@ -298,8 +303,10 @@ impl Tile {
         let Exactly { direction, interval: [tmin, tmax], scale } = &self.exactly[group];
         let direction = Vec3::from_array(direction.map(|axis| axis[lane]));
         let interval = (tmin[lane], tmax[lane]);
-        let frame = Frame::near(Vec3::from(self.origin), self.local, self.reach, direction, interval, &self.domain);
-        Frame { scale: scale[lane], ..frame }
+        let mut frame = Frame::zeroed();
+        frame.set_near(Vec3::from(self.origin), self.local, self.reach, direction, interval, &self.domain);
+        frame.scale = scale[lane];
+        frame
     }
 }
 
@@ -307,7 +314,8 @@ impl Group {
     /// The middle of spans of slopes, and a half that reaches their ends however the middle was rounded.
     #[inline(always)]
     fn set_middle(&mut self, spans: [(f32, f32); 2]) {
-        for (k, (low, high)) in spans.into_iter().enumerate() {
+        for k in 0..2 {
+            let (low, high) = spans[k];
             self.middle[k] = 0.5 * (low + high);
             self.half[k] = (high - self.middle[k]).max(self.middle[k] - low);
         }
@@ -328,7 +336,12 @@ fn extremes<S: Simd>(simd: S, rows: [S::F32; LANES]) -> [S::F32; 2] {
 /// The greatest of eight numbers.
 #[inline(always)]
 pub fn greatest(values: &[f32; LANES]) -> f32 {
-    let four: [f32; 4] = std::array::from_fn(|i| if values[i] > values[i + 4] { values[i] } else { values[i + 4] });
-    let two: [f32; 2] = std::array::from_fn(|i| if four[i] > four[i + 2] { four[i] } else { four[i + 2] });
-    if two[0] > two[1] { two[0] } else { two[1] }
+    let [a, b, c, d, e, f, g, h] = *values;
+    let (a, b, c, d) = (greater(a, e), greater(b, f), greater(c, g), greater(d, h));
+    greater(greater(a, c), greater(b, d))
+}
+
+#[inline(always)]
+fn greater(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
 }

@@ -5,13 +5,14 @@ use super::{GROUPS, ROUNDING, rays::Tile};
 use crate::{
     Mesh,
     accel::structure::{NodeRef, Structure, View},
+    mesh::Reader,
     ray::{Eight, Hit, MISS},
     simd::Simd,
     traverse::{
         exact::Exact,
         frame::Frame,
         kernel::{self, Entry},
-        leaf::{Best, Search, corners},
+        leaf::{Best, Search},
         probe::Silent,
     },
     triangle::{self, Block, LANES},
@@ -35,7 +36,7 @@ impl Tile {
         if self.slanted >> group & 1 == 1 {
             return self.decide_one_by_one(mesh, group, lanes, block, triangle);
         }
-        let exact = self.exact(simd, group, &self.repeated(simd, block.corners(triangle)));
+        let exact = self.exact(simd, group, &self.repeated(simd, block.corners(triangle).each_ref()));
         let t = simd.store(exact.t);
         let [tmin, tmax] = self.exactly[group].interval;
         let (hit, unclear) = (lanes & exact.hit, lanes & exact.unclear);
@@ -101,7 +102,7 @@ impl Tile {
         if primitive == MISS {
             return Hit { t: frame.tmax, ..Hit::MISS };
         }
-        triangle::evaluate(frame, corners(mesh, primitive), primitive)
+        triangle::evaluate(frame, mesh.reader().places(primitive), primitive)
     }
 
     /// Go on below a node ray by ray.
@@ -181,8 +182,9 @@ impl Tile {
             }
             differ |= hits.primitive[lane] != any;
         }
+        let mesh = mesh.reader();
         let corners =
-            if differ { self.gathered(simd, mesh, &hits.primitive) } else { self.repeated(simd, corners(mesh, any)) };
+            if differ { self.gathered(simd, mesh, &hits.primitive) } else { self.repeated(simd, mesh.places(any)) };
         let exact = self.exact(simd, group, &corners);
         hits.t = simd.store(simd.mul(exact.t, simd.load(&self.exactly[group].scale)));
         hits.u = simd.store(exact.u);
@@ -194,10 +196,10 @@ impl Tile {
 
     /// Corners of eight triangles relative to the origin, in the order of the tile's axes.
     #[inline(always)]
-    fn gathered<S: Simd>(&self, simd: S, mesh: &Mesh, triangles: &[u32; LANES]) -> [[S::F32; 3]; 3] {
+    fn gathered<S: Simd>(&self, simd: S, mesh: Reader<'_>, triangles: &[u32; LANES]) -> [[S::F32; 3]; 3] {
         let mut columns = [[[0.0; LANES]; 3]; 3];
         for (lane, &triangle) in triangles.iter().enumerate() {
-            let [a, b, c] = corners(mesh, triangle);
+            let [a, b, c] = mesh.places(triangle);
             for k in 0..3 {
                 columns[0][k][lane] = a[k];
                 columns[1][k][lane] = b[k];
@@ -216,7 +218,7 @@ impl Tile {
 
     /// Corners of one triangle relative to the origin, in the order of the tile's axes, in every lane.
     #[inline(always)]
-    fn repeated<S: Simd>(&self, simd: S, corners: [[f32; 3]; 3]) -> [[S::F32; 3]; 3] {
+    fn repeated<S: Simd>(&self, simd: S, corners: [&[f32; 3]; 3]) -> [[S::F32; 3]; 3] {
         let mut relative = [[simd.splat(0.0); 3]; 3];
         for c in 0..3 {
             for k in 0..3 {
