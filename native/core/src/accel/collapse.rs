@@ -3,7 +3,8 @@
 //! Wide BVHs", HPG 2017.
 //!
 //! Opening the largest child first, which needs no table, makes 6 to 11% more steps a ray in `sbvh` on Sponza, Sibenik
-//! and hair, primary and diffuse rays together.
+//! and hair, primary and diffuse rays together. In `bvh-sah` it makes up to 9% more, and 11% more bytes (bunny): a wide
+//! node has 3.7 children then, not 6.
 
 use super::tree::Tree;
 use crate::{Error, error, triangle::LANES};

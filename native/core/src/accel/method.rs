@@ -108,7 +108,7 @@ impl Recipe {
     /// How a tree is packed: well where the build takes its time anyway.
     pub(super) fn opening(self) -> Opening {
         match self {
-            Self::Hierarchy(Hierarchy::Spatial | Hierarchy::LocallyOrdered, _)
+            Self::Hierarchy(Hierarchy::Sah | Hierarchy::Spatial | Hierarchy::LocallyOrdered, _)
             | Self::Hierarchy(_, Finish::Reinserted) => Opening::Cheapest,
             _ => Opening::Largest,
         }

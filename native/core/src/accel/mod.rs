@@ -67,6 +67,7 @@ use self::{
     config::Config,
     decision::Decision,
     grid::BuiltGrid,
+    layout::Opening,
     method::{Finish, Hierarchy, Recipe},
     structure::Structure,
     tree::{Kind, Tree, TreeNode},
@@ -276,7 +277,7 @@ impl Builder<'_> {
             choice::Builder::Clustered => self.clustered(),
             choice::Builder::Complete => {
                 let tree = self.hybrid(Hierarchy::Sah, &expected::ExpectedCost)?;
-                self.timed("pack", |this| pack::pack(&tree, this.mesh, this.job))
+                self.timed("pack", |this| pack::pack_opened(&tree, this.mesh, Opening::Cheapest, this.job))
             }
         }
     }

@@ -178,7 +178,7 @@ pub const NEST_STACK: usize = 2;
 pub struct Node {
     /// `plane[k][lane]` is the lower, `plane[3 + k][lane]` the upper side along axis k; +inf and -inf where empty.
     pub plane: [[f32; LANES]; 6],
-    /// The children; the used ones come first.
+    /// The children, the largest first and the unused ones last.
     pub child: [NodeRef; LANES],
     /// For rays of each octant (see [`Frame::octant`](crate::traverse::frame::Frame::octant)) the eight lanes, three
     /// bits each, the one to visit last in the lowest bits. In the highest eight bits of each word, the lanes that are
@@ -204,13 +204,21 @@ impl Node {
         order: [0; LANES],
     };
 
-    /// A node with these children, whose boxes are in coordinates of the mesh; the boxes of [`NodeRef::EMPTY`] are
-    /// empty.
+    /// A node with these children in any order, whose boxes are in coordinates of the mesh; the boxes of
+    /// [`NodeRef::EMPTY`] are empty.
     #[inline(always)]
     pub fn new(child: [NodeRef; LANES], bounds: &[BoundsA; LANES], centre: Vec3A) -> Self {
-        let mut node = Self { child, ..Self::EMPTY };
-        for (lane, bounds) in bounds.iter().enumerate() {
+        let mut smallness = [f32::INFINITY; LANES];
+        for lane in 0..LANES {
+            if child[lane] != NodeRef::EMPTY {
+                smallness[lane] = -bounds[lane].half_area();
+            }
+        }
+        let (lanes, mut node) = (ranks(&smallness), Self::EMPTY);
+        for (from, bounds) in bounds.iter().enumerate() {
+            let lane = lanes[from] as usize % LANES;
             let (lower, upper) = (bounds.lower - centre, bounds.upper - centre);
+            node.child[lane] = child[from];
             for k in 0..3 {
                 node.plane[k][lane] = lower[k];
                 node.plane[3 + k][lane] = upper[k];

@@ -181,8 +181,9 @@ pub fn warm<S: Simd>(simd: S, here: View<'_>, node: NodeRef) {
     }
 }
 
-/// Divide the rays at a node among its children, the nearest child's on top; where any hit will do, the leaves' on top
-/// of the branches', since the rays that they stop need not go deeper.
+/// Divide the rays at a node among its children, the nearest child's on top. Where any hit will do, the leaves' are on
+/// top of the branches', since the rays that they stop need not go deeper, and among each the largest child's, which
+/// stops the most: in closed rooms endless rays take 1/1.3 (Sponza) and 1/1.4 (Sibenik) of the time, elsewhere as long.
 #[inline(always)]
 fn branch<S: Simd, const ANY: bool>(
     simd: S,
@@ -215,7 +216,7 @@ fn branch<S: Simd, const ANY: bool>(
     for mut rest in [any & !leaves, any & leaves] {
         let mut order = node.order[octant];
         while rest != 0 {
-            let child = order & 7;
+            let child = if ANY { rest.ilog2() } else { order & 7 };
             order >>= 3;
             if rest >> child & 1 == 0 {
                 continue;
