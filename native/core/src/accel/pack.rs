@@ -1,6 +1,5 @@
-//! From the binary tree to the structure that rays walk: the largest children are opened until eight are side by
-//! side, leaves become blocks, grids are joined into one store. After Wald, Benthin and Boulos, "Getting Rid of
-//! Packets", RT 2008.
+//! From the binary tree to the structure that rays walk: up to eight nodes stand side by side in a wide one, leaves
+//! become blocks, grids are joined into one store. After Wald, Benthin and Boulos, "Getting Rid of Packets", RT 2008.
 
 use glam::Vec3A;
 use rayon::prelude::*;
