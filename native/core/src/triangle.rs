@@ -57,6 +57,19 @@ impl Block {
         corners
     }
 
+    /// The corners in a lane relative to the origin of a ray; see [`relative`].
+    #[inline(always)]
+    pub fn relative(&self, lane: usize, frame: &Frame) -> [[f32; 3]; 3] {
+        let mut relative = [[0.0; 3]; 3];
+        for k in 0..3 {
+            let axis = frame.axes[k] as usize;
+            for c in 0..3 {
+                relative[c][k] = self.corner[c][axis][lane] - frame.origin[axis];
+            }
+        }
+        relative
+    }
+
     /// The exact test of one lane. Few tests are left to it.
     #[cold]
     #[inline(never)]
@@ -68,7 +81,7 @@ impl Block {
 /// Where a ray meets a triangle, in the frame's units, if it does so within the frame's interval.
 #[inline(always)]
 pub fn intersect(frame: &Frame, corners: [[f32; 3]; 3], primitive: u32) -> Option<Hit> {
-    let [a, b, c] = sheared(frame, corners.each_ref());
+    let [a, b, c] = sheared(frame, relative(frame, corners.each_ref()));
     let (u, v, w) = (edge(c, b), edge(a, c), edge(b, a));
     let inside = sign(u, b, c);
     if inside != sign(v, c, a) || inside != sign(w, a, b) {
@@ -81,10 +94,24 @@ pub fn intersect(frame: &Frame, corners: [[f32; 3]; 3], primitive: u32) -> Optio
     (frame.tmin <= hit.t && hit.t <= frame.tmax).then_some(hit)
 }
 
-/// Where a ray meets a triangle that it is known to meet, in the frame's units: what [`intersect`] says, to the bit.
+/// Corners relative to the origin of a ray, in the order of its [`Frame::axes`].
 #[inline(always)]
-pub fn evaluate(frame: &Frame, corners: [&[f32; 3]; 3], primitive: u32) -> Hit {
-    let [a, b, c] = sheared(frame, corners);
+pub fn relative(frame: &Frame, corners: [&[f32; 3]; 3]) -> [[f32; 3]; 3] {
+    let mut relative = [[0.0; 3]; 3];
+    for k in 0..3 {
+        let axis = frame.axes[k] as usize;
+        for c in 0..3 {
+            relative[c][k] = corners[c][axis] - frame.origin[axis];
+        }
+    }
+    relative
+}
+
+/// Where a ray meets a triangle that it is known to meet, by its [`relative`] corners, in the frame's units: what
+/// [`intersect`] says, to the bit.
+#[inline(always)]
+pub fn evaluate(frame: &Frame, relative: [[f32; 3]; 3], primitive: u32) -> Hit {
+    let [a, b, c] = sheared(frame, relative);
     weigh(frame, [edge(c, b), edge(a, c), edge(b, a)], [a[2], b[2], c[2]], primitive)
 }
 
@@ -98,19 +125,16 @@ fn weigh(frame: &Frame, [u, v, w]: [f64; 3], [a, b, c]: [f64; 3], primitive: u32
 }
 
 #[inline(always)]
-fn sheared(frame: &Frame, [a, b, c]: [&[f32; 3]; 3]) -> [[f64; 3]; 3] {
+fn sheared(frame: &Frame, [a, b, c]: [[f32; 3]; 3]) -> [[f64; 3]; 3] {
     [shear(frame, a), shear(frame, b), shear(frame, c)]
 }
 
 /// A corner in sheared space. x and y are rounded to single precision step by step, in the order the vector filter
 /// rounds them, so that the filter and this test see the same point.
 #[inline(always)]
-fn shear(frame: &Frame, corner: &[f32; 3]) -> [f64; 3] {
-    let along = |axis: u32| corner[axis as usize] - frame.origin[axis as usize];
-    let [kx, ky, kz] = frame.axes;
-    let z = along(kz);
-    let x = along(kx) - frame.shear[0] * z;
-    let y = along(ky) - frame.shear[1] * z;
+fn shear(frame: &Frame, [x, y, z]: [f32; 3]) -> [f64; 3] {
+    let x = x - frame.shear[0] * z;
+    let y = y - frame.shear[1] * z;
     [f64::from(x), f64::from(y), f64::from(z)]
 }
 

@@ -87,17 +87,17 @@ pub fn trace<S: Simd, P: Probe, const GRIDS: bool, const ANY: bool>(
     stack: &mut [Entry],
     probe: &mut P,
 ) -> Hit {
-    let mut search = Search { simd, frame, mesh, probe, best: Best::none(frame.tmax) };
+    let mut search = Search::new(simd, frame, mesh, probe, Best::none(frame.tmax));
     trace_below::<S, P, GRIDS, ANY>(&mut search, structure, (view, structure.root), stack);
-    search.best.answer::<ANY>(frame, mesh)
+    search.answer::<ANY>()
 }
 
 /// Go on with a search below a node, which is one of those that `view` shows.
 #[inline(always)]
-pub fn trace_below<S: Simd, P: Probe, const GRIDS: bool, const ANY: bool>(
-    search: &mut Search<'_, S, P>,
-    structure: &Structure,
-    (view, node): (View<'_>, NodeRef),
+pub fn trace_below<'a, S: Simd, P: Probe, const GRIDS: bool, const ANY: bool>(
+    search: &mut Search<'a, S, P>,
+    structure: &'a Structure,
+    (view, node): (View<'a>, NodeRef),
     stack: &mut [Entry],
 ) {
     let simd = search.simd;

@@ -31,19 +31,13 @@ impl Best {
         Self { low: hit.t, high: hit.t, primitive: hit.primitive }
     }
 
-    /// What is told of the hit: all, or, where `ANY` will do, of which triangle it is.
-    #[inline(always)]
-    pub fn answer<const ANY: bool>(&self, frame: &Frame, mesh: &Mesh) -> Hit {
-        if ANY { Hit { primitive: self.primitive, ..Hit::MISS } } else { self.hit(frame, mesh) }
-    }
-
     /// The hit, evaluated; in the frame's units.
     #[inline(always)]
     fn hit(&self, frame: &Frame, mesh: &Mesh) -> Hit {
         if self.primitive == MISS {
             return Hit::MISS;
         }
-        triangle::evaluate(frame, mesh.reader().places(self.primitive), self.primitive)
+        triangle::evaluate(frame, triangle::relative(frame, mesh.reader().places(self.primitive)), self.primitive)
     }
 
     /// Which of two hits whose intervals overlap comes first.
@@ -67,21 +61,61 @@ pub struct Search<'a, S: Simd, P> {
     pub mesh: &'a Mesh,
     pub probe: &'a mut P,
     pub best: Best,
+    /// The block and the lane that the best hit so far came from, if it came from a block of the structure.
+    place: Option<(&'a Block, usize)>,
 }
 
-impl<S: Simd, P: Probe> Search<'_, S, P> {
-    /// Test the first `count` triangles of a block; true once there is any hit in it, where `ANY` is wanted.
+impl<'a, S: Simd, P: Probe> Search<'a, S, P> {
+    /// A search for what is better than the best hit so far.
     #[inline(always)]
-    pub fn block<const ANY: bool>(&mut self, block: &Block, count: u32) -> bool {
+    pub fn new(simd: S, frame: &'a Frame, mesh: &'a Mesh, probe: &'a mut P, best: Best) -> Self {
+        Self { simd, frame, mesh, probe, best, place: None }
+    }
+
+    /// What is told of the best hit: all, or, where `ANY` will do, of which triangle it is. The triangle is read from
+    /// its block, which is near, where it can be.
+    #[inline(always)]
+    pub fn answer<const ANY: bool>(&self) -> Hit {
+        let Self { frame, best, .. } = self;
+        if ANY || best.primitive == MISS {
+            return Hit { primitive: best.primitive, ..Hit::MISS };
+        }
+        if let Some((block, lane)) = self.place {
+            return triangle::evaluate(frame, block.relative(lane, frame), best.primitive);
+        }
+        best.hit(frame, self.mesh)
+    }
+
+    /// Test the first `count` triangles of a block of the structure; see [`Self::test`].
+    #[inline(always)]
+    pub fn block<const ANY: bool>(&mut self, block: &'a Block, count: u32) -> bool {
+        let mut lane = LANES;
+        let found = self.test::<ANY>(block, count, &mut lane);
+        if lane != LANES {
+            self.place = Some((block, lane));
+        }
+        found
+    }
+
+    /// Test the first `count` triangles of a block; true once there is any hit in it, where `ANY` is wanted. Where one
+    /// of them becomes the best, `place` becomes its lane.
+    #[inline(always)]
+    fn test<const ANY: bool>(&mut self, block: &Block, count: u32, place: &mut usize) -> bool {
         self.probe.tests(count);
         let sheared = Sheared::new(self.simd, self.frame, block);
         let candidates = !sheared.missed(self.simd) & ((1 << count) - 1);
-        candidates != 0 && self.candidates::<ANY>(block, &sheared, candidates)
+        candidates != 0 && self.candidates::<ANY>(block, &sheared, candidates, place)
     }
 
     /// Test the triangles that may be hit.
     #[inline(always)]
-    fn candidates<const ANY: bool>(&mut self, block: &Block, sheared: &Sheared<S>, candidates: u32) -> bool {
+    fn candidates<const ANY: bool>(
+        &mut self,
+        block: &Block,
+        sheared: &Sheared<S>,
+        candidates: u32,
+        place: &mut usize,
+    ) -> bool {
         let crossings = sheared.cross(self.simd, self.frame, self.frame.tmin, self.best.high);
         let mut candidates = candidates & !crossings.outside;
         if ANY && candidates & crossings.sure != 0 {
@@ -99,7 +133,9 @@ impl<S: Simd, P: Probe> Search<'_, S, P> {
             } else {
                 continue;
             };
-            self.offer(hit);
+            if self.offer(hit) {
+                *place = lane;
+            }
             if ANY {
                 return true;
             }
@@ -107,13 +143,18 @@ impl<S: Simd, P: Probe> Search<'_, S, P> {
         false
     }
 
+    /// Take the better of a hit and the best so far; true where it is the former.
     #[inline(always)]
-    fn offer(&mut self, hit: Best) {
+    fn offer(&mut self, hit: Best) -> bool {
         if hit.high < self.best.low {
             self.best = hit;
-        } else if hit.low <= self.best.high {
-            self.best = self.best.settle(hit, self.frame, self.mesh);
+            return true;
         }
+        if hit.low > self.best.high {
+            return false;
+        }
+        self.best = self.best.settle(hit, self.frame, self.mesh);
+        self.best.primitive == hit.primitive
     }
 
     /// Test triangles by index, eight at a time; true once there is any hit among them, where `ANY` is wanted.
@@ -124,7 +165,12 @@ impl<S: Simd, P: Probe> Search<'_, S, P> {
             for (lane, &triangle) in group.iter().enumerate() {
                 block.set(lane, triangle, self.mesh.corners(triangle));
             }
-            if self.block::<ANY>(&block, group.len() as u32) {
+            let mut lane = LANES;
+            let found = self.test::<ANY>(&block, group.len() as u32, &mut lane);
+            if lane != LANES {
+                self.place = None;
+            }
+            if found {
                 return true;
             }
         }

@@ -293,7 +293,8 @@ impl Single<'_> {
         if self.frame.tmin > self.frame.tmax {
             return;
         }
-        let mut search = Search { simd, frame: self.frame, mesh, probe: &mut Silent, best: *self.best };
+        let mut silent = Silent;
+        let mut search = Search::new(simd, self.frame, mesh, &mut silent, *self.best);
         search.block::<ANY>(block, count);
         let best = search.best;
         self.keep::<ANY>(best);
@@ -312,7 +313,8 @@ impl Single<'_> {
         if self.frame.tmin > self.frame.tmax {
             return;
         }
-        let mut search = Search { simd, frame: self.frame, mesh, probe: &mut Silent, best: *self.best };
+        let mut silent = Silent;
+        let mut search = Search::new(simd, self.frame, mesh, &mut silent, *self.best);
         kernel::trace_below::<S, Silent, GRIDS, ANY>(&mut search, structure, node, stack);
         let best = search.best;
         self.keep::<ANY>(best);

@@ -102,7 +102,7 @@ impl Tile {
         if primitive == MISS {
             return Hit { t: frame.tmax, ..Hit::MISS };
         }
-        triangle::evaluate(frame, mesh.reader().places(primitive), primitive)
+        triangle::evaluate(frame, triangle::relative(frame, mesh.reader().places(primitive)), primitive)
     }
 
     /// Go on below a node ray by ray.
@@ -120,7 +120,8 @@ impl Tile {
             for lane in 0..LANES {
                 let frame = self.frame(group, lane);
                 let before = self.as_searched(group, lane, &frame);
-                let mut search = Search { simd, frame: &frame, mesh, probe: &mut Silent, best: before };
+                let mut silent = Silent;
+                let mut search = Search::new(simd, &frame, mesh, &mut silent, before);
                 kernel::trace_below::<S, Silent, GRIDS, false>(&mut search, structure, node, stack);
                 let Best { low, high, primitive } = search.best;
                 if primitive != before.primitive {
