@@ -39,7 +39,60 @@ fn agree(mesh: &Arc<Mesh>, rays: &RayBatch) {
             let accelerator = built.with_level(level);
             assert_eq!(closest(&accelerator, rays), expected, "{} {}", method.name(), level.name());
             assert_eq!(occluded(&accelerator, rays), blocked, "{} {}", method.name(), level.name());
+            assert_eq!(in_packets(&accelerator, rays), blocked, "{} {}", method.name(), level.name());
         }
+    }
+}
+
+fn in_packets(accelerator: &Accelerator, rays: &RayBatch) -> Vec<bool> {
+    let mut blocked = vec![false; rays.len()];
+    accelerator.tracer().occluded_in_packets(&rays.rays(), &mut blocked).unwrap();
+    blocked
+}
+
+/// From point to point along a spiral on a sphere, into the half space outside: some along the axes, some without any
+/// interval, some that begin behind their origin.
+fn along_a_spiral(numbers: &mut Numbers, count: usize) -> RayBatch {
+    let mut rays = RayBatch::default();
+    for index in 0..count {
+        let (height, turn) = (1.0 - 2.0 * (index as f32 + 0.5) / count as f32, index as f32 * 0.05);
+        let around = (1.0 - height * height).sqrt();
+        let normal = Vec3::new(around * turn.cos(), around * turn.sin(), height);
+        let direction = match index % 7 {
+            0 => Vec3::X * normal.x.signum(),
+            1 => Vec3::new(0.0, normal.y, normal.z),
+            _ => normal + 0.9 * numbers.point(),
+        };
+        let (near, far) = match index % 11 {
+            3 => (0.2, 0.1),
+            5 => (-0.3, 0.1),
+            8 => (0.0, f32::INFINITY),
+            _ => (0.0, 0.15),
+        };
+        rays.push(normal * 1.001, direction, near, far);
+    }
+    rays
+}
+
+#[test]
+fn short_rays_side_by_side() {
+    let numbers = &mut Numbers(4);
+    let mesh = soup(numbers, 3000, 0.1);
+    let rays = along_a_spiral(numbers, 6003);
+    agree(&mesh, &rays);
+}
+
+#[test]
+fn packets_and_streams_are_compared_in_large_batches() {
+    let numbers = &mut Numbers(5);
+    let mesh = soup(numbers, 3000, 0.1);
+    let rays = along_a_spiral(numbers, 200_000);
+    for level in Level::available() {
+        let built = Accelerator::build(mesh.clone(), Method::BvhSah, &Config::default(), 2, &Job::new()).unwrap();
+        let accelerator = built.with_level(level);
+        let expected: Vec<bool> = closest(&accelerator, &rays).t.iter().map(|t| t.is_finite()).collect();
+        assert_eq!(occluded(&accelerator, &rays), expected, "{}", level.name());
+        assert_eq!(in_packets(&accelerator, &rays), expected, "{}", level.name());
     }
 }
 

@@ -6,10 +6,11 @@ use super::{
     frame::Frame,
     kernel::{self, Entry},
     pace::Pace,
+    packet,
     probe::{Counts, Probe},
     single::{One, Scene},
     stream::{Bin, Lists},
-    tile::{Tile, Visit},
+    tile::{EXTENTS, Tile, Visit},
     together::{Take, Together},
     waiting::{self, Waiting},
 };
@@ -49,7 +50,19 @@ impl<'a> Tracer<'a> {
     /// [`Error::Ray`] for the first unusable ray.
     pub fn occluded(self, rays: &Rays<'_>, occluded: &mut [bool]) -> Result<(), Error> {
         assert_eq!(rays.len(), occluded.len());
-        self.silent::<_, true>(rays, occluded, &Pace::default())
+        self.silent::<_, true>(rays, occluded, &Pace::streams())
+    }
+
+    /// [`Tracer::occluded`] by packets of eight rays as they come: for rays that begin side by side.
+    ///
+    /// # Errors
+    /// [`Error::Ray`] for the first unusable ray.
+    pub fn occluded_in_packets(self, rays: &Rays<'_>, occluded: &mut [bool]) -> Result<(), Error> {
+        assert_eq!(rays.len(), occluded.len());
+        if !EXTENTS.contains(&self.structure.domain.half_extent) {
+            return self.occluded(rays, occluded);
+        }
+        self.with_room(|room| self.level.run(Packets { tracer: self, rays, occluded, room }))
     }
 
     /// What the closest-hit query of every ray costs where it walks alone, on the calling thread.
@@ -101,6 +114,9 @@ impl<'a> Tracer<'a> {
 /// Smaller batches are traced ray by ray.
 const LEAST_STREAM: usize = 64;
 
+/// In smaller batches packets and streams are not compared: it takes some ten thousand rays.
+const LEAST_COMPARED: usize = 1 << 16;
+
 /// What traversals need to remember things in, reused from batch to batch.
 #[derive(Default)]
 pub struct Room {
@@ -110,6 +126,7 @@ pub struct Room {
     pub lists: Lists,
     pub tile: Box<Tile>,
     pub visits: Vec<Visit>,
+    pub packet: Vec<packet::Visit>,
 }
 
 /// Rays that walk alone under the eyes of probes, and what to do with the index, frame, hit (in the frame's units) and
@@ -150,6 +167,27 @@ impl<F: FnMut(usize, &Frame, Hit, P), P: Probe + Default> Singles<'_, F, P> {
     }
 }
 
+/// Rays of which any hit is wanted, in packets.
+struct Packets<'a> {
+    tracer: Tracer<'a>,
+    rays: &'a Rays<'a>,
+    occluded: &'a mut [bool],
+    room: &'a mut Room,
+}
+
+impl Kernel for Packets<'_> {
+    type Output = Result<(), Error>;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> Self::Output {
+        let Self { tracer, rays, occluded, room: Room { packet, stack, .. } } = self;
+        match tracer.structure.has_grids() {
+            false => packet::each::<S, _, false>(simd, tracer, rays, (packet, stack), (occluded, 0)),
+            true => packet::each::<S, _, true>(simd, tracer, rays, (packet, stack), (occluded, 0)),
+        }
+    }
+}
+
 /// The least rays between two looks at the job.
 const PART: usize = 1 << 13;
 
@@ -169,8 +207,10 @@ impl Tracer<'_> {
     /// # Errors
     /// As there, and [`Error::Cancelled`].
     pub fn occluded_parallel(self, rays: &Rays<'_>, out: &mut [bool], threads: usize, job: &Job) -> Result<(), Error> {
+        let pace = if rays.len() < LEAST_COMPARED { Pace::streams() } else { Pace::default() };
         let part = self.part(rays, threads);
-        parallel(rays, (part, out.chunks_mut(part)), threads, job, |rays, out| self.occluded(&rays, out))
+        let work = |rays: Rays<'_>, out: &mut [bool]| self.silent::<_, true>(&rays, out, &pace);
+        parallel(rays, (part, out.chunks_mut(part)), threads, job, work)
     }
 
     /// [`Tracer::counted`] on several threads; 0 means all.

@@ -12,6 +12,7 @@ mod leaf;
 mod lists;
 mod nest;
 mod pace;
+mod packet;
 pub mod probe;
 mod setup;
 mod single;

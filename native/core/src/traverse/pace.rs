@@ -8,11 +8,24 @@ use std::{
 
 use super::stream;
 
-/// After a measurement its verdict stands for this many rays.
-const TERM: usize = 1 << 15;
+/// How two traversers are compared. Rays that keep together from one point or side by side make tiles, the tiles of
+/// rays where any hit will do being packets.
+#[derive(Debug)]
+pub struct Terms {
+    /// After a measurement its verdict stands for this many rays.
+    term: usize,
+    /// Rays of the stream that tiles are compared with.
+    stream: usize,
+    /// Nanoseconds a ray below which a tile is not compared.
+    cheap: f64,
+}
 
-/// Nanoseconds a ray below which a tile is not compared: no stream was ever that fast on rays that meet anything.
-const CHEAP: f64 = 30.0;
+/// Camera rays: their tiles are several times faster than streams, or not. No stream was ever as fast as the cheapest
+/// tiles on rays that meet anything.
+pub const TILES: Terms = Terms { term: 1 << 15, stream: stream::BIN, cheap: 30.0 };
+
+/// Where any hit will do: packets and streams differ by less than half, and a stream must be long to show what it can.
+pub const PACKETS: Terms = Terms { term: 1 << 17, stream: 8 * stream::BIN, cheap: 0.0 };
 
 /// A tile that takes so many times what a stream is expected to take ends the term: a verdict on the sky is none on a
 /// small picture's few tiles of everything else (measured: 2.4 microseconds a ray).
@@ -42,6 +55,11 @@ enum Turn {
 }
 
 impl Pace {
+    /// Streams, and nothing is compared.
+    pub fn streams() -> Self {
+        Self { streams_are_faster: true.into(), rays_left: u32::MAX.into(), ..Self::default() }
+    }
+
     /// Who is to take the next rays.
     #[inline]
     fn turn(&self) -> Turn {
@@ -62,10 +80,10 @@ impl Pace {
     }
 
     /// A verdict on the next rays, from the nanoseconds a ray that tiles take and streams are expected to.
-    fn decide(&self, tiles: f64, stream: f64) {
+    fn decide(&self, tiles: f64, stream: f64, term: usize) {
         self.streams_are_faster.store(stream < tiles, Relaxed);
         self.stream.store(stream as u32, Relaxed);
-        self.rays_left.store(TERM as u32, Relaxed);
+        self.rays_left.store(term as u32, Relaxed);
     }
 
     /// Whether a tile was so slow, in nanoseconds a ray, that its verdict is not to stand.
@@ -75,14 +93,12 @@ impl Pace {
 }
 
 /// Tiles that are measured; the fastest counts, for what disturbs a measurement makes it longer.
-const TILES: u32 = 2;
-
-/// Rays of the stream that tiles are compared with.
-const STREAM: usize = stream::BIN;
+const MEASURED: u32 = 2;
 
 /// The part that one batch has in a query's [`Pace`].
 pub struct Trial<'p> {
     pace: &'p Pace,
+    terms: &'static Terms,
     stage: Stage,
 }
 
@@ -98,14 +114,15 @@ enum Stage {
 
 impl<'p> Trial<'p> {
     /// For a new batch.
-    pub fn new(pace: &'p Pace) -> Self {
-        Self { pace, stage: Stage::Serving }
+    pub fn new(pace: &'p Pace, terms: &'static Terms) -> Self {
+        Self { pace, terms, stage: Stage::Serving }
     }
 
-    /// Whether the next rays should make a tile, if they can.
+    /// Whether the next rays should make a tile, if they can. A measurement begins where no rays wait, `idle`.
     #[inline]
-    pub fn wants_tiles(&mut self) -> bool {
+    pub fn wants_tiles(&mut self, idle: bool) -> bool {
         match (self.stage, self.pace.turn()) {
+            (Stage::Serving, Turn::Both) if !idle => false,
             (Stage::Serving, Turn::Both) => {
                 self.stage = Stage::Tiles { count: 0, nanoseconds: f64::INFINITY };
                 true
@@ -125,7 +142,7 @@ impl<'p> Trial<'p> {
                 self.stage = Stage::Tiles { count: count + 1, nanoseconds: nanoseconds.min(took) };
             }
             Stage::Serving if self.pace.is_refuted(took) => {
-                self.stage = Stage::Tiles { count: TILES, nanoseconds: took };
+                self.stage = Stage::Tiles { count: MEASURED, nanoseconds: took };
             }
             _ => {}
         }
@@ -139,9 +156,9 @@ impl<'p> Trial<'p> {
                 self.pace.took(count);
                 false
             }
-            Stage::Tiles { count: TILES, nanoseconds } => {
+            Stage::Tiles { count: MEASURED, nanoseconds } => {
                 let tiles = *nanoseconds;
-                if tiles > CHEAP {
+                if tiles > self.terms.cheap {
                     self.stage = Stage::Stream { tiles, start: Instant::now(), rays: 0 };
                     return true;
                 }
@@ -151,7 +168,7 @@ impl<'p> Trial<'p> {
             Stage::Tiles { .. } => false,
             Stage::Stream { rays, .. } => {
                 *rays += count;
-                *rays >= STREAM
+                *rays >= self.terms.stream
             }
         }
     }
@@ -170,7 +187,7 @@ impl<'p> Trial<'p> {
     }
 
     fn decide(&mut self, tiles: f64, stream: f64) {
-        self.pace.decide(tiles, stream);
+        self.pace.decide(tiles, stream, self.terms.term);
         self.stage = Stage::Serving;
     }
 }
@@ -189,9 +206,9 @@ mod tests {
         let pace = Pace::default();
         for (tiles, turn) in [(200.0, Turn::Stream), (50.0, Turn::Tile)] {
             assert_eq!(pace.turn(), Turn::Both);
-            pace.decide(tiles, 100.0);
+            pace.decide(tiles, 100.0, TILES.term);
             assert_eq!(pace.turn(), turn);
-            pace.took(TERM - 1);
+            pace.took(TILES.term - 1);
             assert_eq!(pace.turn(), turn);
             pace.took(2);
         }
@@ -200,31 +217,40 @@ mod tests {
     #[test]
     fn slow_tiles_are_compared_with_a_stream() {
         let pace = Pace::default();
-        let mut trial = Trial::new(&pace);
-        for count in 0..TILES {
-            assert!(trial.wants_tiles() && count < TILES);
+        let mut trial = Trial::new(&pace, &TILES);
+        for count in 0..MEASURED {
+            assert!(trial.wants_tiles(true) && count < MEASURED);
             trial.traced_tile(a_millisecond_ago(), 8);
-            assert_eq!(trial.took(8), count + 1 == TILES);
+            assert_eq!(trial.took(8), count + 1 == MEASURED);
         }
         trial.emptied();
-        assert!(!trial.wants_tiles() && trial.took(STREAM));
+        assert!(!trial.wants_tiles(true) && trial.took(TILES.stream));
         trial.emptied();
         assert_eq!(pace.turn(), Turn::Stream);
-        assert!(!trial.wants_tiles());
+        assert!(!trial.wants_tiles(true));
     }
     #[test]
     fn one_slow_tile_ends_the_term_of_those_before() {
         let pace = Pace::default();
-        pace.decide(20.0, UNKNOWN);
-        let mut trial = Trial::new(&pace);
+        pace.decide(20.0, UNKNOWN, TILES.term);
+        let mut trial = Trial::new(&pace, &TILES);
         trial.traced_tile(Instant::now(), usize::MAX);
-        assert!(!trial.took(8) && trial.wants_tiles());
+        assert!(!trial.took(8) && trial.wants_tiles(true));
         trial.traced_tile(a_millisecond_ago(), 8);
         assert!(trial.took(8));
         trial.emptied();
-        assert!(!trial.wants_tiles() && trial.took(STREAM));
+        assert!(!trial.wants_tiles(true) && trial.took(TILES.stream));
         trial.emptied();
         assert_eq!(pace.turn(), Turn::Stream);
+    }
+
+    #[test]
+    fn nothing_is_measured_while_rays_wait() {
+        let pace = Pace::default();
+        let mut trial = Trial::new(&pace, &PACKETS);
+        assert!(!trial.wants_tiles(false));
+        assert!(trial.wants_tiles(true));
+        assert!(trial.wants_tiles(false));
     }
 
     fn a_millisecond_ago() -> Instant {

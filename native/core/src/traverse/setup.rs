@@ -3,64 +3,93 @@
 use super::frame::{DILATION, Domain, Frame, NEAR, PARALLEL};
 use crate::{simd::Simd, triangle::LANES};
 
-/// The frames of eight rays, given by column: origin, direction, tmin, tmax. False where one of them is unusable or
-/// begins far away; then `frames` is unspecified, and [`Frame::new`] is to be asked for each.
-#[inline(always)]
-pub fn eight<S: Simd>(simd: S, columns: &[S::F32; 8], domain: &Domain, frames: &mut [Frame; LANES]) -> bool {
-    let zero = simd.splat(0.0);
-    let [mut origin, mut direction, mut local, mut to_centre] = [[zero; 3]; 4];
-    let (mut finite, mut largest, mut reach) = (zero, zero, zero);
-    for k in 0..3 {
-        let centre = simd.splat(domain.centre[k]);
-        origin[k] = columns[k];
-        direction[k] = columns[3 + k];
-        local[k] = simd.sub(origin[k], centre);
-        to_centre[k] = simd.sub(centre, origin[k]);
-        finite = simd.add(finite, simd.add(simd.mul(origin[k], zero), simd.mul(direction[k], zero)));
-        largest = simd.max(simd.abs(direction[k]), largest);
-        reach = simd.max(simd.abs(local[k]), reach);
-    }
-    let [.., tmin, tmax] = *columns;
-    let sound = simd.le(finite, zero)
-        & simd.le(simd.splat(1e-37), largest)
-        & simd.le(largest, simd.splat(1e38))
-        & simd.le(reach, simd.splat(NEAR * domain.half_extent))
-        & (simd.le(tmin, tmax) | simd.le(tmax, tmin));
-    if sound != 0xff {
-        return false;
+/// The frames of eight rays, by column.
+pub struct Frames<S: Simd> {
+    /// See [`Frame::inverse`].
+    pub inverse: [S::F32; 3],
+    /// See [`Frame::near_bias`].
+    pub near_bias: [S::F32; 3],
+    /// See [`Frame::far_bias`].
+    pub far_bias: [S::F32; 3],
+    /// See [`Frame::tmin`].
+    pub tmin: S::F32,
+    /// See [`Frame::tmax`].
+    pub tmax: S::F32,
+    /// See [`Frame::local`].
+    pub local: [S::F32; 3],
+    /// See [`Frame::direction`].
+    pub direction: [S::F32; 3],
+    origin: [S::F32; 3],
+    scale: S::F32,
+}
+
+impl<S: Simd> Frames<S> {
+    /// The frames of eight rays, given by column: origin, direction, tmin, tmax. `None` where one of them is unusable
+    /// or begins far away; then [`Frame::new`] is to be asked for each.
+    #[inline(always)]
+    pub fn new(simd: S, columns: &[S::F32; 8], domain: &Domain) -> Option<Self> {
+        let zero = simd.splat(0.0);
+        let [mut origin, mut direction, mut local, mut to_centre] = [[zero; 3]; 4];
+        let (mut finite, mut largest, mut reach) = (zero, zero, zero);
+        for k in 0..3 {
+            let centre = simd.splat(domain.centre[k]);
+            origin[k] = columns[k];
+            direction[k] = columns[3 + k];
+            local[k] = simd.sub(origin[k], centre);
+            to_centre[k] = simd.sub(centre, origin[k]);
+            finite = simd.add(finite, simd.add(simd.mul(origin[k], zero), simd.mul(direction[k], zero)));
+            largest = simd.max(simd.abs(direction[k]), largest);
+            reach = simd.max(simd.abs(local[k]), reach);
+        }
+        let [.., tmin, tmax] = *columns;
+        let sound = simd.le(finite, zero)
+            & simd.le(simd.splat(1e-37), largest)
+            & simd.le(largest, simd.splat(1e38))
+            & simd.le(reach, simd.splat(NEAR * domain.half_extent))
+            & (simd.le(tmin, tmax) | simd.le(tmax, tmin));
+        if sound != 0xff {
+            return None;
+        }
+
+        let length = simd.and(largest, simd.splat(f32::INFINITY));
+        let scale = simd.sub_bits(simd.splat(f32::from_bits(254 << 23)), length);
+        let margin = simd.mul(simd.splat(DILATION), simd.add(reach, simd.splat(domain.half_extent)));
+        let margin = simd.add(margin, simd.splat(f32::MIN_POSITIVE));
+        let [mut inverse, mut near_bias, mut far_bias] = [[zero; 3]; 3];
+        for k in 0..3 {
+            direction[k] = simd.mul(direction[k], scale);
+            let sign = simd.and(direction[k], simd.splat(-0.0));
+            let steep = simd.max(simd.abs(direction[k]), simd.splat(PARALLEL));
+            inverse[k] = simd.div(simd.splat(1.0), simd.or(steep, sign));
+            let bias = simd.mul(to_centre[k], inverse[k]);
+            let slack = simd.mul(simd.abs(inverse[k]), margin);
+            near_bias[k] = simd.sub(bias, slack);
+            far_bias[k] = simd.add(bias, slack);
+        }
+        let (tmin, tmax) = (simd.mul(tmin, length), simd.mul(tmax, length));
+        Some(Self { inverse, near_bias, far_bias, tmin, tmax, local, direction, origin, scale })
     }
 
-    let length = simd.and(largest, simd.splat(f32::INFINITY));
-    let scale = simd.sub_bits(simd.splat(f32::from_bits(254 << 23)), length);
-    let margin = simd.mul(simd.splat(DILATION), simd.add(reach, simd.splat(domain.half_extent)));
-    let margin = simd.add(margin, simd.splat(f32::MIN_POSITIVE));
-    let [mut inverse, mut near_bias, mut far_bias] = [[zero; 3]; 3];
-    for k in 0..3 {
-        direction[k] = simd.mul(direction[k], scale);
-        let sign = simd.and(direction[k], simd.splat(-0.0));
-        let steep = simd.max(simd.abs(direction[k]), simd.splat(PARALLEL));
-        inverse[k] = simd.div(simd.splat(1.0), simd.or(steep, sign));
-        let bias = simd.mul(to_centre[k], inverse[k]);
-        let slack = simd.mul(simd.abs(inverse[k]), margin);
-        near_bias[k] = simd.sub(bias, slack);
-        far_bias[k] = simd.add(bias, slack);
+    /// The frames one by one.
+    #[inline(always)]
+    pub fn store(&self, simd: S, frames: &mut [Frame; LANES]) {
+        let zero = simd.splat(0.0);
+        let Self { tmin, tmax, scale, .. } = *self;
+        let (axes, shear) = shear(simd, self.direction, self.inverse);
+        let ([i, n, f], [l, o, d]) =
+            ([self.inverse, self.near_bias, self.far_bias], [self.local, self.origin, self.direction]);
+        let rows = [
+            simd.transpose([i[0], i[1], i[2], n[0], n[1], n[2], f[0], f[1]]),
+            simd.transpose([f[2], tmin, tmax, l[0], l[1], l[2], zero, zero]),
+            simd.transpose([o[0], o[1], o[2], shear[0], shear[1], axes[0], axes[1], axes[2]]),
+            simd.transpose([d[0], d[1], d[2], scale, zero, zero, zero, zero]),
+        ];
+        for lane in 0..LANES {
+            let [a, b, c, d] = rows;
+            frames[lane] =
+                bytemuck::cast([simd.store(a[lane]), simd.store(b[lane]), simd.store(c[lane]), simd.store(d[lane])]);
+        }
     }
-    let (axes, shear) = shear(simd, direction, inverse);
-    let (tmin, tmax) = (simd.mul(tmin, length), simd.mul(tmax, length));
-
-    let [i, n, f, l, o, d] = [inverse, near_bias, far_bias, local, origin, direction];
-    let rows = [
-        simd.transpose([i[0], i[1], i[2], n[0], n[1], n[2], f[0], f[1]]),
-        simd.transpose([f[2], tmin, tmax, l[0], l[1], l[2], zero, zero]),
-        simd.transpose([o[0], o[1], o[2], shear[0], shear[1], axes[0], axes[1], axes[2]]),
-        simd.transpose([d[0], d[1], d[2], scale, zero, zero, zero, zero]),
-    ];
-    for lane in 0..LANES {
-        let [a, b, c, d] = rows;
-        frames[lane] =
-            bytemuck::cast([simd.store(a[lane]), simd.store(b[lane]), simd.store(c[lane]), simd.store(d[lane])]);
-    }
-    true
 }
 
 /// The axes of the sheared space, as bits, and the direction over its dominant component.
@@ -110,7 +139,8 @@ mod tests {
         fn run<S: Simd>(self, simd: S) -> Self::Output {
             let mut frames = [Frame::zeroed(); LANES];
             let columns = self.0.eight(0).map(|column| simd.load(&column));
-            eight(simd, &columns, self.1, &mut frames).then_some(frames)
+            Frames::new(simd, &columns, self.1)?.store(simd, &mut frames);
+            Some(frames)
         }
     }
 

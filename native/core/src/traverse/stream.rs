@@ -15,7 +15,7 @@ use super::{
     kernel,
     leaf::{Best, Search},
     probe::Silent,
-    setup,
+    setup::Frames,
     waiting::Waiting,
 };
 use crate::{
@@ -60,7 +60,9 @@ impl Bin {
         let (groups, _) = self.frames.as_chunks_mut();
         for (first, frames) in places.clone().step_by(LANES).zip(groups) {
             waiting.warm(simd, first + 2 * LANES);
-            if !setup::eight(simd, &waiting.eight(simd, first..places.end), domain, frames) {
+            if let Some(eight) = Frames::new(simd, &waiting.eight(simd, first..places.end), domain) {
+                eight.store(simd, frames);
+            } else {
                 for (place, frame) in (first..places.end).zip(&mut *frames) {
                     *frame = waiting.frame(place, domain)?;
                 }

@@ -7,9 +7,11 @@ use super::{
     Tracer,
     answers::Answers,
     batch::Room,
-    pace::{Pace, Trial},
+    frame::Domain,
+    pace::{self, Pace, Trial},
+    packet,
     stream::{self, BIN},
-    tile,
+    tile::{self, EXTENTS},
 };
 use crate::{
     Error,
@@ -50,6 +52,28 @@ impl Take for [bool] {
     }
 }
 
+/// Whether most of the rays begin near the one before.
+#[inline(always)]
+fn are_side_by_side(rays: &Rays<'_>, domain: &Domain) -> bool {
+    let (mut near, mut pairs) = (0, 0);
+    for index in (1..rays.len()).step_by(SAMPLED) {
+        let apart = rays.get(index).origin - rays.get(index - 1).origin;
+        near += usize::from(apart.abs().max_element() < NEIGHBOURS * domain.half_extent);
+        pairs += 1;
+    }
+    2 * near >= pairs
+}
+
+/// Rays between two looks at the clock where they walk in packets. After a stream the first of them wait for the tree:
+/// by 256 rays, packets that took 1/1.2 of the time seemed to take longer.
+const PACKED: usize = 1024;
+
+/// Every so many rays are compared with the one before.
+const SAMPLED: usize = 16;
+
+/// Half extents of the scene within which rays are near each other: an edge of a cell of the grid over the rays.
+const NEIGHBOURS: f32 = 1.0 / 8.0;
+
 /// After rays of one origin that make no tile, tiles are not tried for so many.
 const UNRIPE: usize = 128;
 
@@ -79,7 +103,14 @@ impl<T: Take + ?Sized, const ANY: bool> Kernel for Together<'_, T, ANY> {
 impl<'a, T: Take + ?Sized, const ANY: bool> Together<'a, T, ANY> {
     /// The batch as a kernel; what it learns about its rays goes to `pace`.
     pub fn new(tracer: Tracer<'a>, rays: &'a Rays<'a>, to: &'a mut T, room: &'a mut Room, pace: &'a Pace) -> Self {
-        Self { tracer, rays, to, room, trial: Trial::new(pace), ripe: 0 }
+        Self {
+            tracer,
+            rays,
+            to,
+            room,
+            trial: Trial::new(pace, if ANY { &pace::PACKETS } else { &pace::TILES }),
+            ripe: 0,
+        }
     }
 
     #[inline(always)]
@@ -87,12 +118,18 @@ impl<'a, T: Take + ?Sized, const ANY: bool> Together<'a, T, ANY> {
         self.room.waiting.begin(self.rays.len());
         let mut next = 0;
         while next < self.rays.len() {
-            let mut taken = if ANY || next < self.ripe { 0 } else { self.tile::<S, GRIDS>(simd, next) };
+            let mut taken = if next < self.ripe {
+                0
+            } else if ANY {
+                self.packets::<S, GRIDS>(simd, next)?
+            } else {
+                self.tile::<S, GRIDS>(simd, next)
+            };
             if taken == 0 {
                 taken = self.room.waiting.add(simd, self.rays, next, &self.tracer.structure.domain)?;
             }
             next += taken;
-            let measured = !ANY && self.trial.took(taken);
+            let measured = self.trial.took(taken);
             if measured || self.room.waiting.is_full() || next == self.rays.len() {
                 self.streams::<S, GRIDS>(simd)?;
                 self.trial.emptied();
@@ -123,8 +160,8 @@ impl<'a, T: Take + ?Sized, const ANY: bool> Together<'a, T, ANY> {
     #[inline(always)]
     fn tile<S: Simd, const GRIDS: bool>(&mut self, simd: S, first: usize) -> usize {
         let Tracer { structure, mesh, .. } = self.tracer;
-        let Room { stack, tile, visits, .. } = &mut *self.room;
-        if !self.trial.wants_tiles() || !self.rays.is_common_origin(first) {
+        let Room { stack, tile, visits, waiting, .. } = &mut *self.room;
+        if !self.trial.wants_tiles(waiting.is_empty()) || !self.rays.is_common_origin(first) {
             return 0;
         }
         let start = Instant::now();
@@ -139,6 +176,26 @@ impl<'a, T: Take + ?Sized, const ANY: bool> Together<'a, T, ANY> {
         }
         self.trial.traced_tile(start, taken);
         taken
+    }
+
+    /// Trace the rays from `first` on in packets; returns how many rays, 0 where it is not their turn or they would not
+    /// keep together.
+    #[inline(always)]
+    fn packets<S: Simd, const GRIDS: bool>(&mut self, simd: S, first: usize) -> Result<usize, Error> {
+        let domain = &self.tracer.structure.domain;
+        let Room { stack, packet, waiting, .. } = &mut *self.room;
+        if !EXTENTS.contains(&domain.half_extent) || !self.trial.wants_tiles(waiting.is_empty()) {
+            return Ok(0);
+        }
+        let rays = self.rays.part(first, PACKED);
+        if !are_side_by_side(&rays, domain) {
+            self.ripe = first + UNRIPE;
+            return Ok(0);
+        }
+        let start = Instant::now();
+        packet::each::<S, T, GRIDS>(simd, self.tracer, &rays, (packet, stack), (&mut *self.to, first))?;
+        self.trial.traced_tile(start, rays.len());
+        Ok(rays.len())
     }
 
     /// Tell what the rays of a bin hit.

@@ -65,7 +65,7 @@ impl Waiting {
     #[inline(always)]
     pub fn add<S: Simd>(&mut self, simd: S, rays: &Rays<'_>, first: usize, domain: &Domain) -> Result<usize, Error> {
         if first + LANES <= rays.len() {
-            let columns = load(simd, &rays.eight(first));
+            let columns = load_all(simd, &rays.eight(first));
             if usable(simd, &columns) {
                 self.put(simd, &columns, first, domain);
                 self.count += LANES;
@@ -92,6 +92,12 @@ impl Waiting {
             indices[lane] = (first + lane) as u32;
         }
         self.keys[places].copy_from_slice(&keys(simd, columns, domain));
+    }
+
+    /// Whether no rays wait.
+    #[inline(always)]
+    pub fn is_empty(&self) -> bool {
+        self.count == 0
     }
 
     /// Whether no eight more rays fit.
@@ -163,8 +169,9 @@ impl Waiting {
     }
 }
 
+/// Eight columns of eight.
 #[inline(always)]
-fn load<S: Simd>(simd: S, columns: &[[f32; LANES]; 8]) -> [S::F32; 8] {
+pub fn load_all<S: Simd>(simd: S, columns: &[[f32; LANES]; 8]) -> [S::F32; 8] {
     let mut loaded = [simd.splat(0.0); 8];
     for column in 0..8 {
         loaded[column] = simd.load(&columns[column]);

@@ -220,6 +220,9 @@ impl Walk {
         let (mut hits, mut blocked) = (Hits::misses(part.len()), vec![false; part.len()]);
         accelerator.closest(&part, hits.as_mut(), 1, &Job::new()).unwrap();
         accelerator.occluded(&part, &mut blocked, 1, &Job::new()).unwrap();
+        let mut in_packets = vec![false; part.len()];
+        accelerator.tracer().occluded_in_packets(&part, &mut in_packets).unwrap();
+        assert_eq!(in_packets, blocked, "{self:?}");
         (0..part.len()).map(|index| (first + index, hits.get(index), blocked[index])).collect()
     }
 }

@@ -57,7 +57,7 @@ const BLOCKS: usize = GROUPS / LANES;
 
 /// Tiles are used where half the scene's longest edge is in this range: outside, products of three lengths may leave
 /// the range of single precision.
-const EXTENTS: std::ops::RangeInclusive<f32> = 1e-9..=1e9;
+pub const EXTENTS: std::ops::RangeInclusive<f32> = 1e-9..=1e9;
 
 /// Half a unit in the last place of single precision.
 const ROUNDING: f32 = 1.0 / (1 << 24) as f32;
