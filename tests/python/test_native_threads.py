@@ -1,8 +1,10 @@
 """Threads: the same results for any number, other Python threads run meanwhile, a cancel ends work at once, and nothing
-stays behind: no thread, no memory."""
+stays behind: no memory, and no thread but those that built last, for the next build."""
 
 import functools
 import gc
+import os
+import signal
 import sys
 import threading
 import time
@@ -45,6 +47,13 @@ def falls_to(count: int) -> bool:
     while task_count() > count and time.perf_counter() < deadline:
         time.sleep(0.01)
     return task_count() <= count
+
+
+def cancelled_job() -> rt.Job:
+    """A job that was cancelled before it began."""
+    job = rt.Job()
+    job.cancel()
+    return job
 
 
 def same_cells(a: rt.Accelerator, b: rt.Accelerator) -> bool:
@@ -187,7 +196,7 @@ def test_other_python_threads_run_during_a_query() -> None:
 
 
 @needs_tasks
-def test_no_thread_outlives_a_call_and_small_batches_start_none() -> None:
+def test_no_thread_outlives_a_query_and_small_batches_start_none() -> None:
     mesh = soup()
     accelerator = rt.Accelerator.build(mesh, threads=2)
     idle = idle_count()
@@ -208,6 +217,38 @@ def test_no_thread_outlives_a_call_and_small_batches_start_none() -> None:
     accelerator.closest(*large, threads=4)
     rt.Mesh(*triangle_soup(0, 100_000, 0.1))
     assert falls_to(idle)
+
+
+@needs_tasks
+def test_builds_keep_the_threads_of_the_last_one_and_a_cancelled_one_keeps_none() -> None:
+    mesh = soup()
+    with pytest.raises(rt.Cancelled):
+        rt.Accelerator.build(mesh, threads=2, job=cancelled_job())
+    none = idle_count()
+    for threads in (4, 2, 3, 3):
+        rt.Accelerator.build(mesh, threads=threads)
+        assert falls_to(none + threads)
+    with pytest.raises(rt.Cancelled):
+        rt.Accelerator.build(mesh, threads=3, job=cancelled_job())
+    assert falls_to(none)
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system does not fork")
+@pytest.mark.filterwarnings("ignore:.*multi-threaded.*fork:DeprecationWarning")
+def test_a_forked_process_builds_with_threads_of_its_own() -> None:
+    mesh = soup()
+    cells = rt.Accelerator.build(mesh, threads=2).cells()
+    child = os.fork()
+    if child == 0:
+        again = rt.Accelerator.build(mesh, threads=2).cells()
+        os._exit(0 if np.array_equal(again.lower, cells.lower) else 1)
+    deadline = time.perf_counter() + 20
+    while (status := os.waitpid(child, os.WNOHANG)) == (0, 0) and time.perf_counter() < deadline:
+        time.sleep(0.01)
+    if status == (0, 0):
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+    assert status == (child, 0)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads the resident size that Linux reports")

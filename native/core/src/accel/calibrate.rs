@@ -52,7 +52,7 @@ pub fn calibrate() -> Result<CostConstants, Error> {
         let entered: Vec<Time> = grids.iter().map(|time| time.less(RAYS as f64 * node_ns)).collect();
         let [cell_ns, gather_ns] = least_squares(&entered);
         Ok(CostConstants { node_ns, block_ns, cell_ns, gather_ns, reference_ns })
-    })?
+    })
 }
 
 /// A mesh, and rays through it.

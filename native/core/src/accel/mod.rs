@@ -112,7 +112,7 @@ impl Accelerator {
         job.begin(Phase::Build, method.passes() * mesh.solid_count() as u64);
         let mut builder =
             Builder { mesh: &mesh, config, job, phases: Vec::new(), decisions: Vec::new(), choice: Vec::new() };
-        let structure = pool::install(threads, || builder.structure(method.recipe()))??;
+        let structure = pool::install(threads, || builder.structure(method.recipe()))?;
         let Builder { phases, decisions, choice, .. } = builder;
         Ok(Self { mesh, method, structure, phases, decisions, choice, level: Level::detect() })
     }

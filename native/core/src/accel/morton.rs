@@ -207,8 +207,7 @@ mod tests {
         let place = |i: u32| Vec3::new((i * 37 % 101) as f32, (i * 53 % 97) as f32, (i * 71 % 89) as f32);
         let vertices = (0..count).flat_map(|i| [place(i), place(i) + Vec3::X, place(i) + Vec3::Y]).collect();
         let mesh = Mesh::new(vertices, (0..count).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect()).unwrap();
-        let [one, three] =
-            [1, 3].map(|threads| pool::install(threads, || sorted(&mesh, &Job::new())).unwrap().unwrap());
+        let [one, three] = [1, 3].map(|threads| pool::install(threads, || sorted(&mesh, &Job::new())).unwrap());
         assert!(one.is_sorted() && one[..] == three[..]);
         let mut triangles: Vec<u32> = one.iter().map(|key| key.triangle()).collect();
         triangles.sort_unstable();
