@@ -32,7 +32,7 @@ pub fn plan(clusters: &Clusters, leaf_size: usize, job: &Job) -> Result<(Top, Ve
         job.check()?;
         let mut draft = Draft::default();
         let expand = |records: &mut Vec<Record>| cells.iter().for_each(|cell| clusters.expand(cell, records));
-        planner.plan(expand, &clusters.triangles, leaf_size, &mut draft);
+        planner.plan(expand, &clusters.triangles, leaf_size, &mut draft)?;
         job.advance(draft.triangles as u64);
         Ok(draft)
     });

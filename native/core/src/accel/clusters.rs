@@ -2,10 +2,9 @@
 //! neighbours that are each other's nearest are merged, after Meister and Bittner, "Parallel Locally-Ordered Clustering
 //! for Bounding Volume Hierarchy Construction", TVCG 24(3), 2018; as its distance, the area of the box around both.
 //!
-//! Measured against the surface area heuristic over single triangles, by steps of a ray: from the camera 15% fewer to 3%
-//! more (Sponza and Sibenik fewer; bunny, dragon, city, hair), after a bounce 7% fewer to 3% more, where both open the
-//! largest child first. [`Collapse`](super::collapse::Collapse), which `bvh-sah` has and this has not, makes of that 3%
-//! fewer (Sibenik) to 15% more (Sponza), and 2% fewer to 11% more (hair). Fetching the corners,
+//! Measured against the surface area heuristic over single triangles by the expected cost of the tree: equal (Sibenik),
+//! 1% more (hair, Sponza), 2 to 3% (dragon, city, bunny), 6% (vianney_house); by nodes visited, primary and after a
+//! bounce, 7% fewer (Sibenik) to 12 or 14% more (Sponza and vianney_house from the camera). Fetching the corners,
 //! which miss the cache, is two thirds of the time of clustering; fetching them in a loop of their own did not help, nor
 //! did comparing with 8 neighbours to either side instead of 15.
 

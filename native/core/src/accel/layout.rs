@@ -56,7 +56,10 @@ impl Layout {
     /// # Errors
     /// [`Error::Cancelled`], [`Error::OutOfMemory`].
     pub fn of(tree: &Tree, opening: Opening, job: &Job) -> Result<Self, Error> {
-        let collapse = (opening == Opening::Cheapest).then(|| Collapse::new(tree)).transpose()?;
+        let mut collapse = (opening == Opening::Cheapest).then(Collapse::default);
+        if let Some(collapse) = &mut collapse {
+            collapse.find(tree)?;
+        }
         if tree.nodes.is_empty() { Ok(Self::EMPTY) } else { Widener { tree, collapse, job }.alone(0) }
     }
 
@@ -73,7 +76,7 @@ impl Layout {
 
 struct Widener<'a> {
     tree: &'a Tree,
-    collapse: Option<Collapse<'a>>,
+    collapse: Option<Collapse>,
     job: &'a Job,
 }
 
@@ -151,10 +154,8 @@ impl Widener<'_> {
     /// Up to eight descendants that stand in for a branch, and how many they are.
     fn side_by_side(&self, index: usize) -> ([u32; LANES], usize) {
         let Some(collapse) = &self.collapse else { return self.opened(index) };
-        let children = collapse.children(index);
-        let mut of = [0; LANES];
-        of.iter_mut().zip(&children).for_each(|(of, &child)| *of = child as u32);
-        (of, children.len())
+        let (children, count) = collapse.children(self.tree, index);
+        (children.map(|child| child as u32), count)
     }
 
     /// The same where whichever is largest is opened first.

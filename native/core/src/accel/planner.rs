@@ -1,15 +1,18 @@
-//! The binned surface area heuristic straight to wide nodes: a node's largest child is divided until eight are side by
-//! side. No binary tree is kept; the records move between two buffers, so that a division is one pass without a branch.
+//! The binned surface area heuristic over records, which move between two buffers, so that a division is one pass without
+//! a branch. At the top of a tree a node's largest child is divided until eight are side by side; a subtree is divided
+//! down to leaves as a binary tree, of which the cheapest wide nodes are chosen.
 
 use rayon::prelude::*;
 
 use super::{
     bins::{self, Bins, Centres, Mapping, Plane, Side},
+    collapse::{Binary, Collapse},
     draft::Draft,
     record::Record,
     structure::NodeRef,
 };
 use crate::{
+    Error,
     simd::{Kernel, Level, Simd},
     triangle::LANES,
 };
@@ -196,64 +199,146 @@ pub struct Planner {
     records: Vec<Record>,
     spare: Vec<Record>,
     bins: Bins,
+    links: Links,
+    collapse: Collapse,
     level: Level,
 }
 
 impl Default for Planner {
     fn default() -> Self {
-        Self { records: Vec::new(), spare: Vec::new(), bins: Bins::EMPTY, level: Level::detect() }
+        Self {
+            records: Vec::new(),
+            spare: Vec::new(),
+            bins: Bins::EMPTY,
+            links: Links::default(),
+            collapse: Collapse::default(),
+            level: Level::detect(),
+        }
     }
 }
 
 impl Planner {
     /// Fill an empty draft with the subtree over the records that are added, which refer to `triangles`. At most `leaf_size` triangles
     /// are together in a leaf, and no record has more.
+    ///
+    /// # Errors
+    /// [`Error::OutOfMemory`].
     pub fn plan(
         &mut self,
         add_records: impl FnOnce(&mut Vec<Record>),
         triangles: &[u32],
         leaf_size: usize,
         draft: &mut Draft,
-    ) {
-        self.records.clear();
-        add_records(&mut self.records);
-        let count = self.records.len();
-        self.spare.resize(count.max(self.spare.len()), Record::NONE);
-        let set = Set::new(&mut self.records, &mut self.spare[..count]);
-        let mut work = Work { bins: &mut self.bins, level: self.level, triangles, leaf_size, draft };
-        let (root, stack_size) = work.subtree(set);
-        (draft.root, draft.stack_size) = (root, stack_size);
+    ) -> Result<(), Error> {
+        let Self { records, spare, bins, links, collapse, level } = self;
+        records.clear();
+        add_records(records);
+        let count = records.len();
+        spare.resize(count.max(spare.len()), Record::NONE);
+        links.0.clear();
+        let set = Set::new(records, &mut spare[..count]);
+        Division { bins, level: *level, triangles, leaf_size, links, draft }.divide(set);
+        collapse.find(links)?;
+        (draft.root, draft.stack_size) = Widening { links, collapse, draft }.subtree(0);
+        Ok(())
     }
 }
 
-struct Work<'a> {
+/// A binary tree in preorder.
+#[derive(Debug, Default, Clone)]
+struct Links(Vec<Link>);
+
+#[derive(Debug, Clone, Copy)]
+struct Link {
+    half_area: f32,
+    /// The right child; the left one is the next node.
+    right: u32,
+    /// What it is instead, where it is a leaf.
+    leaf: NodeRef,
+}
+
+impl Binary for Links {
+    fn count(&self) -> usize {
+        self.0.len()
+    }
+
+    #[inline]
+    fn children(&self, node: usize) -> Option<[usize; 2]> {
+        let link = &self.0[node];
+        (link.leaf == NodeRef::EMPTY).then_some([node + 1, link.right as usize])
+    }
+
+    #[inline]
+    fn half_area(&self, node: usize) -> f32 {
+        self.0[node].half_area
+    }
+}
+
+/// Divides sets down to leaves.
+struct Division<'a> {
     bins: &'a mut Bins,
     level: Level,
     triangles: &'a [u32],
     leaf_size: usize,
+    links: &'a mut Links,
     draft: &'a mut Draft,
 }
 
-impl Work<'_> {
-    /// Returns where it is, and the entries a traversal needs on its stack.
-    fn subtree(&mut self, set: Set<'_>) -> (NodeRef, usize) {
+impl Division<'_> {
+    fn divide(&mut self, set: Set<'_>) {
+        let index = self.links.0.len();
+        let half_area = set.side.half_area();
         if set.count() <= self.leaf_size {
-            return (self.leaf(set.records), 0);
+            let places = set.records.iter().flat_map(|record| record.range());
+            let leaf = self.draft.push_leaf(places.map(|place| self.triangles[place]));
+            self.links.0.push(Link { half_area, right: 0, leaf });
+            return;
+        }
+        self.links.0.push(Link { half_area, right: 0, leaf: NodeRef::EMPTY });
+        let [left, right] = self.level.run(Halve { set, bins: self.bins });
+        self.divide(left);
+        self.links.0[index].right = self.links.0.len() as u32;
+        self.divide(right);
+    }
+}
+
+struct Halve<'r, 'b> {
+    set: Set<'r>,
+    bins: &'b mut Bins,
+}
+
+impl<'r> Kernel for Halve<'r, '_> {
+    type Output = [Set<'r>; 2];
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> Self::Output {
+        divide(simd, self.set, self.bins)
+    }
+}
+
+/// Makes wide nodes of the binary ones.
+struct Widening<'a> {
+    links: &'a Links,
+    collapse: &'a Collapse,
+    draft: &'a mut Draft,
+}
+
+impl Widening<'_> {
+    /// Returns where it is, and the entries a traversal needs on its stack.
+    fn subtree(&mut self, node: usize) -> (NodeRef, usize) {
+        let leaf = self.links.0[node].leaf;
+        if leaf != NodeRef::EMPTY {
+            return (leaf, 0);
         }
         let slot = self.draft.nodes.len();
         self.draft.nodes.push([NodeRef::EMPTY; LANES]);
-        let (mut count, mut deepest) = (0, 0);
-        for part in open(set, self.leaf_size, self.bins, self.level).into_iter().flatten() {
-            let (child, below) = self.subtree(part);
-            self.draft.nodes[slot][count] = child;
-            count += 1;
+        let (children, count) = self.collapse.children(self.links, node);
+        let mut deepest = 0;
+        for (lane, &child) in children[..count].iter().enumerate() {
+            let (child, below) = self.subtree(child);
+            self.draft.nodes[slot][lane] = child;
             deepest = deepest.max(below);
         }
         (NodeRef::branch(slot), count - 1 + deepest)
-    }
-
-    fn leaf(&mut self, records: &[Record]) -> NodeRef {
-        let places = records.iter().flat_map(|record| record.range());
-        self.draft.push_leaf(places.map(|place| self.triangles[place]))
     }
 }

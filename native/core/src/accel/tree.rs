@@ -3,7 +3,7 @@
 
 use rayon::prelude::*;
 
-use super::{grid::BuiltGrid, structure::Grid};
+use super::{collapse::Binary, grid::BuiltGrid, structure::Grid};
 use crate::{
     Error, Job, Mesh,
     bounds::{Bounds, BoundsA},
@@ -87,6 +87,20 @@ impl Tree {
             Kind::Branch { right } => Some([index + 1, index + right as usize]),
             Kind::Leaf | Kind::Grid(_) | Kind::Nest(_) => None,
         }
+    }
+}
+
+impl Binary for Tree {
+    fn count(&self) -> usize {
+        self.nodes.len()
+    }
+
+    fn children(&self, node: usize) -> Option<[usize; 2]> {
+        self.children(node)
+    }
+
+    fn half_area(&self, node: usize) -> f32 {
+        self.nodes[node].bounds.half_area()
     }
 }
 
