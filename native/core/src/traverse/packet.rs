@@ -122,7 +122,7 @@ impl<S: Simd> Packet<S> {
     }
 }
 
-/// Tell of every ray whether it hits anything; `first` is the place of the first one's answer.
+/// Tell of every ray whether it hits anything; `place` is that of the first one's answer.
 ///
 /// # Errors
 /// [`Error::Ray`] for an unusable ray.
