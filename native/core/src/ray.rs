@@ -4,6 +4,7 @@ use glam::Vec3;
 
 use crate::{
     Error,
+    simd::read_alone,
     traverse::frame::{Domain, Frame},
     triangle::LANES,
 };
@@ -102,6 +103,16 @@ pub struct Ray {
     pub tmin: f32,
     /// Farthest parameter of interest.
     pub tmax: f32,
+}
+
+impl Ray {
+    /// A copy, read number by number; see [`read_alone`].
+    #[inline(always)]
+    pub(crate) fn read_alone(&self) -> Self {
+        let vector = |v: &Vec3| Vec3::new(read_alone(&v.x), read_alone(&v.y), read_alone(&v.z));
+        let Self { origin, direction, tmin, tmax } = self;
+        Self { origin: vector(origin), direction: vector(direction), tmin: read_alone(tmin), tmax: read_alone(tmax) }
+    }
 }
 
 impl<'a> Rays<'a> {

@@ -31,6 +31,9 @@ pub const DILATION: f32 = 32.0 / (1 << 24) as f32;
 /// a ray by far less than the dilation, and its inverse stays finite.
 pub(super) const PARALLEL: f32 = 1e-18;
 
+/// Largest components of directions that [`inverse`] may be asked about as they are.
+const INVERTIBLE: std::ops::RangeInclusive<f32> = 1e-18..=1e18;
+
 /// Where the scene is, as far as the arithmetic of rays needs to know.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Domain {
@@ -115,26 +118,25 @@ impl Frame {
             return true;
         }
         let interval = (ray.tmin * length, ray.tmax * length);
-        self.set_near(ray.origin, local, reach, direction, interval, domain);
+        let inverse =
+            if INVERTIBLE.contains(&largest) { inverse(ray.direction, length) } else { inverse(direction, 1.0) };
+        self.set_near(ray.origin, (local, reach), (direction, inverse), interval, domain);
         self.scale = scale;
         true
     }
 
     /// Become the frame of a ray whose origin is near; `local` is it relative to the centre, `reach` the largest
-    /// component of that, and direction and interval are scaled already.
+    /// component of that, and direction, [`inverse`] and interval are scaled already.
     #[inline(always)]
     pub(super) fn set_near(
         &mut self,
         origin: Vec3,
-        local: Vec3,
-        reach: f32,
-        direction: Vec3,
+        (local, reach): (Vec3, f32),
+        (direction, inverse): (Vec3, Vec3),
         (tmin, tmax): (f32, f32),
         domain: &Domain,
     ) {
         let margin = DILATION * (reach + domain.half_extent) + f32::MIN_POSITIVE;
-        let parallel = direction.abs().cmplt(Vec3::splat(PARALLEL));
-        let inverse = Vec3::select(parallel, Vec3::splat(PARALLEL).copysign(direction), direction).recip();
         let (bias, slack) = (-local * inverse, inverse.abs() * margin);
         self.inverse = inverse.to_array();
         self.near_bias = (bias - slack).to_array();
@@ -166,12 +168,12 @@ impl Frame {
         let reach = local.abs().max_element();
         if reach > NEAR * domain.half_extent {
             let nowhere = (f32::INFINITY, f32::NEG_INFINITY);
-            self.set_near(domain.centre, Vec3::ZERO, 0.0, direction, nowhere, domain);
+            self.set_near(domain.centre, (Vec3::ZERO, 0.0), (direction, inverse(direction, 1.0)), nowhere, domain);
             return;
         }
         let shifted = |t: f32| (f64::from(t) / f64::from(scale) - advance) as f32;
         let interval = (shifted(ray.tmin), shifted(ray.tmax));
-        self.set_near(origin, local, reach, direction, interval, domain);
+        self.set_near(origin, (local, reach), (direction, inverse(direction, 1.0)), interval, domain);
         self.scale = scale;
         self.advance = advance;
     }
@@ -209,6 +211,14 @@ impl Frame {
             ((f64::from(t) + self.advance) * f64::from(self.scale)) as f32
         }
     }
+}
+
+/// The inverse of a direction over a power of two, `length`: its own inverse times that, to the bit, where neither over-
+/// nor underflows. So the division begins before the length is known; everything waits for it.
+#[inline(always)]
+pub(super) fn inverse(direction: Vec3, length: f32) -> Vec3 {
+    let parallel = direction.abs().cmplt(Vec3::splat(PARALLEL * length));
+    Vec3::select(parallel, Vec3::splat(1.0 / PARALLEL).copysign(direction), direction.recip() * length)
 }
 
 /// Sheared z is the axis along which the ray is steepest. Without branches: which axis it is cannot be predicted.

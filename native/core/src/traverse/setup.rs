@@ -155,13 +155,21 @@ mod tests {
         columns[4][0] = -0.0;
         columns[4][1] = columns[3][1];
         columns[5][1] = -columns[3][1];
-        let [o, d] = [0, 3].map(|first| [0, 1, 2].map(|k| Column::new(&columns[first + k])));
-        let rays = Rays::new(o, d, Column::constant(&0.5), Column::constant(&f32::INFINITY), 8).unwrap();
-        for level in Level::available() {
-            let frames = level.run(Eight(&rays, &domain)).unwrap();
-            for lane in 0..LANES {
-                let single = Frame::new(&rays.get(lane), &domain).unwrap();
-                assert_eq!(bytemuck::bytes_of(&frames[lane]), bytemuck::bytes_of(&single), "{} {lane}", level.name());
+        columns[3][2] = 1e-17;
+        columns[4][2] = -1e-19;
+        for length in [1.0, 1e-36, 3e-19, 1e-18, 0.7e18, 1e19, 1e37] {
+            let scaled = |k: usize| columns[3 + k].iter().map(|component| component * length).collect();
+            let scaled: [Vec<f32>; 3] = std::array::from_fn(scaled);
+            let o = [0, 1, 2].map(|k| Column::new(&columns[k]));
+            let d = [0, 1, 2].map(|k| Column::new(&scaled[k]));
+            let rays = Rays::new(o, d, Column::constant(&0.5), Column::constant(&f32::INFINITY), 8).unwrap();
+            for level in Level::available() {
+                let frames = level.run(Eight(&rays, &domain)).unwrap();
+                for lane in 0..LANES {
+                    let single = Frame::new(&rays.get(lane), &domain).unwrap();
+                    let (one, other) = (bytemuck::bytes_of(&frames[lane]), bytemuck::bytes_of(&single));
+                    assert_eq!(one, other, "{} {length} {lane}", level.name());
+                }
             }
         }
     }

@@ -8,7 +8,7 @@ use crate::{
     accel::structure::NodeRef,
     ray::{MISS, Rays},
     simd::Simd,
-    traverse::frame::{Domain, Frame, NEAR},
+    traverse::frame::{self, Domain, Frame, NEAR},
     triangle::LANES,
 };
 
@@ -304,7 +304,8 @@ impl Tile {
         let direction = Vec3::from_array(direction.map(|axis| axis[lane]));
         let interval = (tmin[lane], tmax[lane]);
         let mut frame = Frame::zeroed();
-        frame.set_near(Vec3::from(self.origin), self.local, self.reach, direction, interval, &self.domain);
+        let (origin, place) = (Vec3::from(self.origin), (self.local, self.reach));
+        frame.set_near(origin, place, (direction, frame::inverse(direction, 1.0)), interval, &self.domain);
         frame.scale = scale[lane];
         frame
     }
