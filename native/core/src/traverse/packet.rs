@@ -26,7 +26,7 @@ use super::{
 };
 use crate::{
     Error, Mesh,
-    accel::structure::{Node, NodeRef, Structure, Target},
+    accel::structure::{Node, NodeRef, Structure, Target, View},
     ray::{Hit, MISS, Rays},
     simd::Simd,
     triangle::LANES,
@@ -180,7 +180,7 @@ fn trace<S: Simd, const GRIDS: bool>(
             (here, floor) = (structure.view(), 0);
         }
         let Some(visit) = visits.pop() else { break };
-        let mut going = visit.rays & open;
+        let going = visit.rays & open;
         let mut node = visit.node;
         if GRIDS
             && let Target::Lazy(cell) = node.target()
@@ -207,27 +207,37 @@ fn trace<S: Simd, const GRIDS: bool>(
                     }
                 }
             }
-            target => {
-                while going != 0 {
-                    let lane = going.trailing_zeros() as usize & (LANES - 1);
-                    going &= going - 1;
-                    let frame = &rays[lane];
-                    let mut silent = Silent;
-                    let mut search = Search::new(simd, frame, mesh, &mut silent, Best::none(frame.tmax));
-                    if let Target::Leaf { block, count } = target {
-                        search.block::<true>(&here.blocks[block as usize], count);
-                    } else {
-                        kernel::trace_below::<S, Silent, GRIDS, true>(&mut search, structure, (here, node), stack);
-                    }
-                    if search.best.primitive != MISS {
-                        open &= !(1 << lane);
-                    }
-                }
-            }
+            _ => open &= !alone::<S, GRIDS>(simd, structure, mesh, (here, node), (&rays, going), stack),
         }
         if open == 0 {
             break;
         }
     }
     all & !open
+}
+
+/// Let rays go on below a node one by one; tells which of them hit anything.
+#[inline(always)]
+fn alone<S: Simd, const GRIDS: bool>(
+    simd: S,
+    structure: &Structure,
+    mesh: &Mesh,
+    (here, node): (View<'_>, NodeRef),
+    (frames, rays): (&[Frame; LANES], u32),
+    stack: &mut [Entry],
+) -> u32 {
+    let (mut rest, mut hit) = (rays, 0);
+    while rest != 0 {
+        let lane = rest.trailing_zeros();
+        rest &= rest - 1;
+        let (frame, mut silent) = (&frames[lane as usize & (LANES - 1)], Silent);
+        let mut search = Search::new(simd, frame, mesh, &mut silent, Best::none(frame.tmax));
+        if let Target::Leaf { block, count } = node.target() {
+            search.block::<true>(&here.blocks[block as usize], count);
+        } else {
+            kernel::trace_below::<S, Silent, GRIDS, true>(&mut search, structure, (here, node), stack);
+        }
+        hit |= u32::from(search.best.primitive != MISS) << lane;
+    }
+    hit
 }
