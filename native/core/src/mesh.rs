@@ -193,6 +193,18 @@ impl<'a> Reader<'a> {
         [self.place(a), self.place(b), self.place(c)]
     }
 
+    /// The three corners of a triangle, and a number behind each.
+    #[inline(always)]
+    pub fn rows(&self, triangle: u32) -> [&'a [f32; 4]; 3] {
+        let [a, b, c] = self.triangles[triangle as usize];
+        [self.row(a), self.row(b), self.row(c)]
+    }
+
+    #[inline(always)]
+    fn row(&self, vertex: u32) -> &'a [f32; 4] {
+        self.numbers[3 * vertex as usize..].first_chunk().expect("a vertex has three coordinates, the last one four")
+    }
+
     #[inline(always)]
     fn place(&self, vertex: u32) -> &'a [f32; 3] {
         self.numbers[3 * vertex as usize..].first_chunk().expect("a vertex has three coordinates")

@@ -38,6 +38,8 @@ pub trait Simd: Copy + Send + Sync + 'static {
     fn splat(self, value: f32) -> Self::F32;
     /// Eight numbers from memory.
     fn load(self, values: &[f32; 8]) -> Self::F32;
+    /// Twice four numbers from memory.
+    fn join(self, low: &[f32; 4], high: &[f32; 4]) -> Self::F32;
     /// Eight numbers to memory.
     fn store(self, value: Self::F32) -> [f32; 8];
     /// a + b

@@ -97,6 +97,11 @@ impl Simd for Neon {
         unsafe { [vld1q_f32(values.as_ptr()), vld1q_f32(values[4..].as_ptr())] }
     }
     #[inline(always)]
+    fn join(self, low: &[f32; 4], high: &[f32; 4]) -> Pair {
+        // SAFETY: as for `splat`; each reference is to 16 readable bytes, and the loads ask for no alignment.
+        unsafe { [vld1q_f32(low.as_ptr()), vld1q_f32(high.as_ptr())] }
+    }
+    #[inline(always)]
     fn store(self, value: Pair) -> [f32; 8] {
         let mut values = [0.0; 8];
         // SAFETY: as for `splat`; each half of the array is 16 writable bytes, and the stores ask for no alignment.

@@ -33,6 +33,10 @@ impl Simd for Portable {
         *values
     }
     #[inline(always)]
+    fn join(self, low: &[f32; 4], high: &[f32; 4]) -> [f32; 8] {
+        bytemuck::cast([*low, *high])
+    }
+    #[inline(always)]
     fn store(self, value: [f32; 8]) -> [f32; 8] {
         value
     }

@@ -62,6 +62,11 @@ macro_rules! arithmetic {
             unsafe { _mm256_loadu_ps(values.as_ptr()) }
         }
         #[inline(always)]
+        fn join(self, low: &[f32; 4], high: &[f32; 4]) -> __m256 {
+            // SAFETY: as for `splat`; the references are to 16 readable bytes and the loads ask for no alignment.
+            unsafe { _mm256_loadu2_m128(high.as_ptr(), low.as_ptr()) }
+        }
+        #[inline(always)]
         fn store(self, value: __m256) -> [f32; 8] {
             let mut values = [0.0; 8];
             // SAFETY: as for `splat`; the array is 32 writable bytes and the store asks for no alignment.

@@ -75,21 +75,21 @@ impl Planes {
                 approached |= self.triangle(simd, tile, mesh, group, block, lane);
             }
             if approached {
-                tile.approach(group);
+                tile.approach(simd, group);
             }
             changed |= approached;
         }
         if changed {
-            tile.update_far();
+            tile.update_far(simd);
         }
     }
 
     /// The triangles that may be met by some ray with slopes between those of a group.
     #[inline(always)]
     fn near<S: Simd>(&self, simd: S, tile: &Tile, group: usize) -> u32 {
-        let group = &tile.groups[group];
-        let middle = [simd.splat(group.middle[0]), simd.splat(group.middle[1])];
-        let half = [simd.splat(group.half[0]), simd.splat(group.half[1])];
+        let (spans, group) = (&tile.spans[group / LANES], group % LANES);
+        let middle = [simd.splat(spans.middle[0][group]), simd.splat(spans.middle[1][group])];
+        let half = [simd.splat(spans.half[0][group]), simd.splat(spans.half[1][group])];
         let mut least = simd.splat(f32::INFINITY);
         for edge in &self.edge {
             let [x, y, z] = [simd.load(&edge[0]), simd.load(&edge[1]), simd.load(&edge[2])];

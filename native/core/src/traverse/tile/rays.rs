@@ -32,10 +32,6 @@ pub struct Group {
     pub high: [f32; LANES],
     /// The triangle of the best hit, or [`MISS`], as bits that no vector operation changes.
     pub best: [f32; LANES],
-    /// The middle of all slopes.
-    pub middle: [f32; 2],
-    /// Their greatest distance from it.
-    pub half: [f32; 2],
 }
 
 /// Eight rays, as the exact test needs them.
@@ -50,11 +46,28 @@ pub struct Exactly {
     pub scale: [f32; LANES],
 }
 
+/// In row `i` lane `i` is set.
+static IDENTITY: [[f32; LANES]; LANES] = identity();
+
+const fn identity() -> [[f32; LANES]; LANES] {
+    let mut rows = [[0.0; LANES]; LANES];
+    let mut row = 0;
+    while row < LANES {
+        rows[row][row] = 1.0;
+        row += 1;
+    }
+    rows
+}
+
 /// The slopes of eight groups, and where the farthest hit of each is.
 #[derive(Debug, Clone, Copy)]
-struct Spans {
+pub struct Spans {
     low: [[f32; LANES]; 2],
     high: [[f32; LANES]; 2],
+    /// The middle of all slopes of a group.
+    pub middle: [[f32; LANES]; 2],
+    /// The greatest distance of any from it.
+    pub half: [[f32; LANES]; 2],
     far: [f32; LANES],
 }
 
@@ -62,6 +75,8 @@ impl Spans {
     const NOTHING: Self = Self {
         low: [[f32::INFINITY; LANES]; 2],
         high: [[f32::NEG_INFINITY; LANES]; 2],
+        middle: [[0.0; LANES]; 2],
+        half: [[0.0; LANES]; 2],
         far: [f32::NEG_INFINITY; LANES],
     };
 }
@@ -99,7 +114,8 @@ pub struct Tile {
     /// The same rays.
     pub exactly: [Exactly; GROUPS],
     domain: Domain,
-    spans: [Spans; BLOCKS],
+    /// What groups have in common, eight by eight.
+    pub spans: [Spans; BLOCKS],
 }
 
 impl Default for Tile {
@@ -228,29 +244,34 @@ impl Tile {
         self.spans = [Spans::NOTHING; BLOCKS];
         for (block, spans) in self.spans.iter_mut().enumerate().take(self.count.div_ceil(LANES)) {
             let first = block * LANES;
+            let groups = &self.groups[first..self.count.min(first + LANES)];
             for k in 0..2 {
-                let mut rows = [simd.splat(0.0); LANES];
-                for row in 0..LANES {
-                    // Groups missing from the last block repeat the last one.
-                    rows[row] = simd.load(&self.groups[(first + row).min(self.count - 1)].slope[k]);
+                // Groups missing from the last block repeat its first one.
+                let mut rows = [simd.load(&groups[0].slope[k]); LANES];
+                for (row, group) in rows.iter_mut().zip(groups) {
+                    *row = simd.load(&group.slope[k]);
                 }
                 let [low, high] = extremes(simd, simd.transpose(rows));
                 all_low[k] = simd.min(low, all_low[k]);
                 all_high[k] = simd.max(high, all_high[k]);
+                // A half that reaches both ends however the middle was rounded.
+                let middle = simd.mul(simd.add(low, high), simd.splat(0.5));
+                let half = simd.max(simd.sub(high, middle), simd.sub(middle, low));
                 (spans.low[k], spans.high[k]) = (simd.store(low), simd.store(high));
+                (spans.middle[k], spans.half[k]) = (simd.store(middle), simd.store(half));
             }
-            let groups = &mut self.groups[first..self.count.min(first + LANES)];
-            for (lane, group) in groups.iter_mut().enumerate() {
-                let ([a, b], [c, d]) = (&spans.low, &spans.high);
-                group.set_middle([(a[lane], c[lane]), (b[lane], d[lane])]);
-                spans.far[lane] = greatest(&group.high);
+            let mut rows = [simd.splat(f32::NEG_INFINITY); LANES];
+            for (row, group) in rows.iter_mut().zip(groups) {
+                *row = simd.load(&group.high);
             }
+            let [_, far] = extremes(simd, simd.transpose(rows));
+            spans.far = simd.store(far);
         }
         for k in 0..2 {
             self.low[k] = -greatest(&simd.store(simd.sub(simd.splat(0.0), all_low[k])));
             self.high[k] = greatest(&simd.store(all_high[k]));
         }
-        self.update_far();
+        self.update_far(simd);
     }
 
     /// A visit for all groups, whatever they meet.
@@ -283,19 +304,24 @@ impl Tile {
         groups & visit.groups
     }
 
-    /// Note that the farthest hit of a group has come nearer; [`Tile::update_far`] is to follow.
+    /// Note that the farthest hit of a group has come nearer; [`Tile::update_far`] is to follow. All eight numbers are
+    /// written at once: a vector could not be read soon after one of them was.
     #[inline(always)]
-    pub fn approach(&mut self, group: usize) {
-        self.spans[group / LANES].far[group % LANES] = greatest(&self.groups[group].high);
+    pub fn approach<S: Simd>(&mut self, simd: S, group: usize) {
+        let (this, others) = (simd.splat(greatest(&self.groups[group].high)), simd.splat(f32::INFINITY));
+        let limit = simd.if_ge(simd.load(&IDENTITY[group % LANES]), simd.splat(1.0), this, others);
+        let far = &mut self.spans[group / LANES].far;
+        *far = simd.store(simd.min(limit, simd.load(far)));
     }
 
     /// Find the farthest hit again.
     #[inline(always)]
-    pub fn update_far(&mut self) {
-        self.far = f32::NEG_INFINITY;
+    pub fn update_far<S: Simd>(&mut self, simd: S) {
+        let mut far = simd.splat(f32::NEG_INFINITY);
         for spans in &self.spans {
-            self.far = self.far.max(greatest(&spans.far));
+            far = simd.max(simd.load(&spans.far), far);
         }
+        self.far = greatest(&simd.store(far));
     }
 
     /// The frame of a ray.
@@ -308,18 +334,6 @@ impl Tile {
         frame.set_near(origin, place, (direction, frame::inverse(direction, 1.0)), interval, &self.domain);
         frame.scale = scale[lane];
         frame
-    }
-}
-
-impl Group {
-    /// The middle of spans of slopes, and a half that reaches their ends however the middle was rounded.
-    #[inline(always)]
-    fn set_middle(&mut self, spans: [(f32, f32); 2]) {
-        for k in 0..2 {
-            let (low, high) = spans[k];
-            self.middle[k] = 0.5 * (low + high);
-            self.half[k] = (high - self.middle[k]).max(self.middle[k] - low);
-        }
     }
 }
 

@@ -128,9 +128,9 @@ impl Tile {
                     self.keep(group, lane, primitive, self.depths(group, lane, [low, high]));
                 }
             }
-            self.approach(group);
+            self.approach(simd, group);
         }
-        self.update_far();
+        self.update_far(simd);
     }
 
     /// The best hit of a ray, as one that walks alone knows it.
@@ -148,11 +148,10 @@ impl Tile {
     /// The best hits of a group, in the rays' own units.
     #[inline(always)]
     pub fn hits<S: Simd>(&self, simd: S, mesh: &Mesh, group: usize) -> Eight {
+        // Of all these bits, those of MISS alone are not a number.
+        let best = simd.load(&self.groups[group].best);
+        let met = simd.le(best, best);
         let mut hits = Eight::MISSES;
-        let mut met = 0;
-        for (lane, best) in self.groups[group].best.iter().enumerate() {
-            met |= u32::from(best.to_bits() != MISS) << lane;
-        }
         if met != 0 && self.slanted >> group & 1 == 1 {
             self.set_one_by_one(mesh, group, &mut hits);
         } else if met != 0 {
@@ -174,44 +173,40 @@ impl Tile {
 
     #[inline(always)]
     fn set_together<S: Simd>(&self, simd: S, mesh: &Mesh, group: usize, met: u32, hits: &mut Eight) {
-        hits.primitive = self.groups[group].best.map(f32::to_bits);
-        let any = hits.primitive[met.trailing_zeros() as usize % LANES];
-        let mut differ = false;
-        for lane in 0..LANES {
-            if hits.primitive[lane] == MISS {
-                hits.primitive[lane] = any;
-            }
-            differ |= hits.primitive[lane] != any;
-        }
+        let bits = &self.groups[group].best;
+        let any = bits[met.trailing_zeros() as usize % LANES];
+        let (best, first, zero) = (simd.load(bits), simd.splat(any), simd.splat(0.0));
+        let triangles = simd.if_ge(best, zero, best, first);
         let mesh = mesh.reader();
-        let corners =
-            if differ { self.gathered(simd, mesh, &hits.primitive) } else { self.repeated(simd, mesh.places(any)) };
+        let corners = if simd.le(triangles, first) & simd.le(first, triangles) == 0xff {
+            self.repeated(simd, mesh.places(any.to_bits()))
+        } else {
+            self.gathered(simd, mesh, &bytemuck::cast(simd.store(triangles)))
+        };
         let exact = self.exact(simd, group, &corners);
-        hits.t = simd.store(simd.mul(exact.t, simd.load(&self.exactly[group].scale)));
-        hits.u = simd.store(exact.u);
-        hits.v = simd.store(exact.v);
-        for lane in (0..LANES).filter(|lane| met >> lane & 1 == 0) {
-            hits.set(lane, Hit::MISS);
-        }
+        let t = simd.mul(exact.t, simd.load(&self.exactly[group].scale));
+        hits.primitive = bytemuck::cast(*bits);
+        hits.t = simd.store(simd.if_ge(best, zero, t, simd.splat(f32::INFINITY)));
+        hits.u = simd.store(simd.if_ge(best, zero, exact.u, zero));
+        hits.v = simd.store(simd.if_ge(best, zero, exact.v, zero));
     }
 
     /// Corners of eight triangles relative to the origin, in the order of the tile's axes.
     #[inline(always)]
     fn gathered<S: Simd>(&self, simd: S, mesh: Reader<'_>, triangles: &[u32; LANES]) -> [[S::F32; 3]; 3] {
-        let mut columns = [[[0.0; LANES]; 3]; 3];
-        for (lane, &triangle) in triangles.iter().enumerate() {
-            let [a, b, c] = mesh.places(triangle);
-            for k in 0..3 {
-                columns[0][k][lane] = a[k];
-                columns[1][k][lane] = b[k];
-                columns[2][k][lane] = c[k];
-            }
+        let [mut first, mut last] = [[simd.splat(0.0); LANES]; 2];
+        for lane in 0..LANES {
+            let [a, b, c] = mesh.rows(triangles[lane]);
+            first[lane] = simd.join(a, b);
+            last[lane] = simd.join(c, c);
         }
-        let mut relative = [[simd.splat(0.0); 3]; 3];
+        let (first, last) = (simd.transpose(first), simd.transpose(last));
+        let places = [[first[0], first[1], first[2]], [first[4], first[5], first[6]], [last[0], last[1], last[2]]];
+        let mut relative = places;
         for c in 0..3 {
             for k in 0..3 {
                 let axis = self.axes[k];
-                relative[c][k] = simd.sub(simd.load(&columns[c][axis]), simd.splat(self.origin[axis]));
+                relative[c][k] = simd.sub(places[c][axis], simd.splat(self.origin[axis]));
             }
         }
         relative
