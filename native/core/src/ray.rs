@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use crate::{
     Error,
-    simd::read_alone,
+    simd::{Simd, read_alone},
     traverse::frame::{Domain, Frame},
     triangle::LANES,
 };
@@ -42,17 +42,17 @@ impl<'a> Column<'a> {
 
     /// The values of rays `index` to `index + 7`.
     #[inline(always)]
-    fn eight(&self, index: usize) -> [f32; 8] {
+    fn eight<S: Simd>(&self, simd: S, index: usize) -> S::F32 {
         match self.stride {
-            0 => [self.values[0]; 8],
-            1 => *self.span::<8>(index),
-            3 => spread::<22, 3>(self.span(3 * index)),
+            0 => simd.splat(self.values[0]),
+            1 => simd.load(self.span(index)),
+            3 => simd.load(&spread::<22, 3>(self.span(3 * index))),
             stride => {
                 let mut eight = [0.0; 8];
                 for lane in 0..8 {
                     eight[lane] = self.values[(index + lane) * stride];
                 }
-                eight
+                simd.load(&eight)
             }
         }
     }
@@ -168,18 +168,18 @@ impl<'a> Rays<'a> {
 
     /// Rays `index` to `index + 7`, by column: origin, direction, tmin, tmax.
     #[inline(always)]
-    pub(crate) fn eight(&self, index: usize) -> [[f32; 8]; 8] {
+    pub(crate) fn eight<S: Simd>(&self, simd: S, index: usize) -> [S::F32; 8] {
         let index = self.first + index;
         let ([ox, oy, oz], [dx, dy, dz]) = (&self.origin, &self.direction);
         [
-            ox.eight(index),
-            oy.eight(index),
-            oz.eight(index),
-            dx.eight(index),
-            dy.eight(index),
-            dz.eight(index),
-            self.tmin.eight(index),
-            self.tmax.eight(index),
+            ox.eight(simd, index),
+            oy.eight(simd, index),
+            oz.eight(simd, index),
+            dx.eight(simd, index),
+            dy.eight(simd, index),
+            dz.eight(simd, index),
+            self.tmin.eight(simd, index),
+            self.tmax.eight(simd, index),
         ]
     }
 

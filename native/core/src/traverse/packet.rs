@@ -22,7 +22,6 @@ use super::{
     setup::Frames,
     stream::warm,
     together::Take,
-    waiting::load_all,
 };
 use crate::{
     Error, Mesh,
@@ -138,7 +137,7 @@ pub fn each<S: Simd, T: Take + ?Sized, const GRIDS: bool>(
     let scene = (structure, structure.view());
     for first in (0..rays.len()).step_by(LANES) {
         if first + LANES <= rays.len()
-            && let Some(frames) = Frames::new(simd, &load_all(simd, &rays.eight(first)), &structure.domain)
+            && let Some(frames) = Frames::new(simd, &rays.eight(simd, first), &structure.domain)
         {
             let hit = trace::<S, GRIDS>(simd, structure, mesh, &frames, visits, stack);
             for lane in 0..LANES {

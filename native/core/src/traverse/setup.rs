@@ -138,7 +138,7 @@ mod tests {
         #[inline(always)]
         fn run<S: Simd>(self, simd: S) -> Self::Output {
             let mut frames = [Frame::zeroed(); LANES];
-            let columns = self.0.eight(0).map(|column| simd.load(&column));
+            let columns = self.0.eight(simd, 0);
             Frames::new(simd, &columns, self.1)?.store(simd, &mut frames);
             Some(frames)
         }

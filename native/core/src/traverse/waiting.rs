@@ -65,7 +65,7 @@ impl Waiting {
     #[inline(always)]
     pub fn add<S: Simd>(&mut self, simd: S, rays: &Rays<'_>, first: usize, domain: &Domain) -> Result<usize, Error> {
         if first + LANES <= rays.len() {
-            let columns = load_all(simd, &rays.eight(first));
+            let columns = rays.eight(simd, first);
             if usable(simd, &columns) {
                 self.put(simd, &columns, first, domain);
                 self.count += LANES;
@@ -167,16 +167,6 @@ impl Waiting {
     pub fn index(&self, place: usize) -> usize {
         self.indices[usize::from(self.order[place])] as usize
     }
-}
-
-/// Eight columns of eight.
-#[inline(always)]
-pub fn load_all<S: Simd>(simd: S, columns: &[[f32; LANES]; 8]) -> [S::F32; 8] {
-    let mut loaded = [simd.splat(0.0); 8];
-    for column in 0..8 {
-        loaded[column] = simd.load(&columns[column]);
-    }
-    loaded
 }
 
 #[inline(always)]

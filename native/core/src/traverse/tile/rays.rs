@@ -189,19 +189,19 @@ impl Tile {
     /// Add a group; false where it does not fit.
     #[inline(always)]
     fn add<S: Simd>(&mut self, simd: S, rays: &Rays<'_>, first: usize) -> bool {
-        let columns = rays.eight(first);
+        let columns = rays.eight(simd, first);
         let zero = simd.splat(0.0);
         let (mut elsewhere, mut largest, mut direction) = (zero, zero, [zero; 3]);
         for k in 0..3 {
-            let offset = simd.sub(simd.load(&columns[k]), simd.splat(self.origin[k]));
-            direction[k] = simd.load(&columns[3 + k]);
+            let offset = simd.sub(columns[k], simd.splat(self.origin[k]));
+            direction[k] = columns[3 + k];
             elsewhere = simd.max(simd.abs(offset), elsewhere);
             elsewhere = simd.add(elsewhere, simd.mul(direction[k], zero));
             largest = simd.max(simd.abs(direction[k]), largest);
         }
         let [x, y, z] = self.axes;
         let [x, y, z] = [direction[x], direction[y], direction[z]];
-        let (tmin, tmax) = (simd.load(&columns[6]), simd.load(&columns[7]));
+        let (tmin, tmax) = (columns[6], columns[7]);
         let rise = simd.mul(z, simd.splat(self.sign));
         let fits = simd.le(elsewhere, zero)
             & simd.le(simd.splat(1e-37), largest)
