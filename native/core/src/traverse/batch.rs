@@ -41,7 +41,7 @@ impl<'a> Tracer<'a> {
     /// [`Error::Ray`] for the first unusable ray.
     pub fn closest(self, rays: &Rays<'_>, hits: &mut HitsMut<'_>) -> Result<(), Error> {
         assert_eq!(rays.len(), hits.len());
-        self.silent::<_, false>(rays, hits, &Pace::default())
+        self.silent::<_, false>(rays, hits, &Pace::closest(rays.len()))
     }
 
     /// Whether anything lies in the interval of every ray, on the calling thread.
@@ -113,9 +113,6 @@ impl<'a> Tracer<'a> {
 
 /// Smaller batches are traced ray by ray.
 const LEAST_STREAM: usize = 64;
-
-/// In smaller batches packets and streams are not compared: it takes some ten thousand rays.
-const LEAST_COMPARED: usize = 1 << 16;
 
 /// What traversals need to remember things in, reused from batch to batch.
 #[derive(Default)]
@@ -197,7 +194,7 @@ impl Tracer<'_> {
     /// # Errors
     /// As there, and [`Error::Cancelled`].
     pub fn closest_parallel(self, rays: &Rays<'_>, hits: HitsMut<'_>, threads: usize, job: &Job) -> Result<(), Error> {
-        let (pace, part) = (Pace::default(), self.part(rays, threads));
+        let (pace, part) = (Pace::closest(rays.len()), self.part(rays, threads));
         let work = |rays: Rays<'_>, mut hits: HitsMut<'_>| self.silent::<_, false>(&rays, &mut hits, &pace);
         parallel(rays, (part, hits.parts(part)), threads, job, work)
     }
@@ -207,8 +204,7 @@ impl Tracer<'_> {
     /// # Errors
     /// As there, and [`Error::Cancelled`].
     pub fn occluded_parallel(self, rays: &Rays<'_>, out: &mut [bool], threads: usize, job: &Job) -> Result<(), Error> {
-        let pace = if rays.len() < LEAST_COMPARED { Pace::streams() } else { Pace::default() };
-        let part = self.part(rays, threads);
+        let (pace, part) = (Pace::occluded(rays.len()), self.part(rays, threads));
         let work = |rays: Rays<'_>, out: &mut [bool]| self.silent::<_, true>(&rays, out, &pace);
         parallel(rays, (part, out.chunks_mut(part)), threads, job, work)
     }

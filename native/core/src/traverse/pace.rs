@@ -18,6 +18,9 @@ pub struct Terms {
     stream: usize,
     /// Nanoseconds a ray below which tiles are not compared.
     cheap: f64,
+    /// A tile that takes so many times what a stream is expected to take ends the term: a verdict on the sky is none on
+    /// everything else.
+    slow: f64,
     /// After a measurement its verdict stands for at most this many rays.
     term: usize,
     /// One for streams stands for this many times the ratio of both times: the more rays, the less it costs to try again.
@@ -25,25 +28,30 @@ pub struct Terms {
 }
 
 /// Camera rays. They see the sky here and a scan there, and tiles may take a tenth of the time of streams or three times
-/// it: so both are measured over as many rays, and streams do not serve long. Against verdicts of half the terms, by
-/// the faster of two tiles, on a Xeon with AVX-512: the room in 1/1.6 of the time, reciprocating_saw 1/1.4, dragon 1/1.2,
-/// Sponza 1/1.1, bunny2 and sibenik equal, stadium and hair_straight 1.07 to 1.09 times. Tiles alone: hair 1.5 times.
-pub const TILES: Terms = Terms { tiles: 4, stream: stream::BIN, cheap: UNKNOWN, term: 1 << 15, retry: 4 * stream::BIN };
+/// it: so both are measured over as many rays, and streams do not serve long. Against verdicts by the faster of two
+/// tiles, as for few rays, on a Xeon with AVX-512: the room in 1/1.3 to 1/1.6 of the time, reciprocating_saw 1/1.4, dragon
+/// 1/1.2, Sponza 1/1.1, bunny2 and Sibenik equal, stadium and hair_straight 1.07 times. Tiles alone: hair 1.5 times.
+const TILES: Terms =
+    Terms { tiles: 4, stream: stream::BIN, cheap: UNKNOWN, slow: 4.0, term: 1 << 15, retry: 4 * stream::BIN };
+
+/// The rays of a small picture. Its tiles cover more, may take 2.4 microseconds a ray, and are soon all traced: by the
+/// terms above ten thousand rays took up to twice as long.
+const FEW_TILES: Terms = Terms { tiles: 2, stream: stream::BIN, cheap: 30.0, slow: 2.0, term: 1 << 15, retry: 1 << 15 };
+
+/// Pictures of fewer rays are small.
+const FEW: usize = 1 << 16;
 
 /// Where any hit will do: packets and streams differ by less than half, and a stream must be long to show what it can.
-pub const PACKETS: Terms = Terms { tiles: 2, stream: 8 * stream::BIN, cheap: 0.0, term: 1 << 17, retry: 1 << 17 };
-
-/// A tile that takes so many times what a stream is expected to take ends the term: a verdict on the sky is none on a
-/// small picture's few tiles of everything else (measured: 2.4 microseconds a ray). It may be an exception, so the next
-/// ones are measured. Twice, instead: room and Sponza 1.2 times as long.
-const SLOW: f64 = 4.0;
+const PACKETS: Terms =
+    Terms { tiles: 2, stream: 8 * stream::BIN, cheap: 0.0, slow: 4.0, term: 1 << 17, retry: 1 << 17 };
 
 /// Nanoseconds a ray that are expected of a stream where none was compared.
 const UNKNOWN: f64 = 150.0;
 
 /// What one query, on all its threads, has learned of its rays.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Pace {
+    terms: &'static Terms,
     streams_are_faster: AtomicBool,
     rays_left: AtomicU32,
     /// Nanoseconds a ray that are expected of a stream.
@@ -62,9 +70,25 @@ enum Turn {
 }
 
 impl Pace {
+    /// For so many rays of which the closest hits are wanted.
+    pub fn closest(rays: usize) -> Self {
+        Self::new(if rays < FEW { &FEW_TILES } else { &TILES })
+    }
+
+    /// For so many rays of which any hit is wanted. For few of them packets and streams are not compared: it takes some
+    /// ten thousand rays.
+    pub fn occluded(rays: usize) -> Self {
+        if rays < FEW { Self::streams() } else { Self::new(&PACKETS) }
+    }
+
     /// Streams, and nothing is compared.
     pub fn streams() -> Self {
-        Self { streams_are_faster: true.into(), rays_left: u32::MAX.into(), ..Self::default() }
+        Self { streams_are_faster: true.into(), rays_left: u32::MAX.into(), ..Self::new(&PACKETS) }
+    }
+
+    fn new(terms: &'static Terms) -> Self {
+        let (streams_are_faster, rays_left, stream) = Default::default();
+        Self { terms, streams_are_faster, rays_left, stream }
     }
 
     /// Who is to take the next rays.
@@ -87,9 +111,10 @@ impl Pace {
     }
 
     /// A verdict on the next rays, from the nanoseconds a ray that tiles take and streams are expected to.
-    fn decide(&self, tiles: f64, stream: f64, terms: &Terms) {
-        let retry = (terms.retry as f64 * tiles / stream) as usize;
-        let term = if stream < tiles { terms.term.min(retry) } else { terms.term };
+    fn decide(&self, tiles: f64, stream: f64) {
+        let Terms { term, retry, .. } = *self.terms;
+        let retry = (retry as f64 * tiles / stream) as usize;
+        let term = if stream < tiles { term.min(retry) } else { term };
         self.streams_are_faster.store(stream < tiles, Relaxed);
         self.stream.store(stream as u32, Relaxed);
         self.rays_left.store(term as u32, Relaxed);
@@ -97,14 +122,13 @@ impl Pace {
 
     /// Whether a tile was so slow, in nanoseconds a ray, that its verdict is not to stand.
     fn is_refuted(&self, tile: f64) -> bool {
-        tile > SLOW * f64::from(self.stream.load(Relaxed))
+        tile > self.terms.slow * f64::from(self.stream.load(Relaxed))
     }
 }
 
 /// The part that one batch has in a query's [`Pace`].
 pub struct Trial<'p> {
     pace: &'p Pace,
-    terms: &'static Terms,
     stage: Stage,
 }
 
@@ -118,12 +142,10 @@ enum Stage {
     Stream { tiles: f64, start: Instant, rays: usize },
 }
 
-const NO_TILE: Stage = Stage::Tiles { count: 0, nanoseconds: 0.0 };
-
 impl<'p> Trial<'p> {
     /// For a new batch.
-    pub fn new(pace: &'p Pace, terms: &'static Terms) -> Self {
-        Self { pace, terms, stage: Stage::Serving }
+    pub fn new(pace: &'p Pace) -> Self {
+        Self { pace, stage: Stage::Serving }
     }
 
     /// Whether the next rays should make a tile, if they can. A measurement begins where no rays wait, `idle`.
@@ -132,7 +154,7 @@ impl<'p> Trial<'p> {
         match (self.stage, self.pace.turn()) {
             (Stage::Serving, Turn::Both) if !idle => false,
             (Stage::Serving, Turn::Both) => {
-                self.stage = NO_TILE;
+                self.stage = Stage::Tiles { count: 0, nanoseconds: 0.0 };
                 true
             }
             (Stage::Serving, turn) => turn == Turn::Tile,
@@ -149,7 +171,9 @@ impl<'p> Trial<'p> {
             Stage::Tiles { count, nanoseconds } => {
                 self.stage = Stage::Tiles { count: count + 1, nanoseconds: nanoseconds + took };
             }
-            Stage::Serving if self.pace.is_refuted(took) => self.stage = NO_TILE,
+            Stage::Serving if self.pace.is_refuted(took) => {
+                self.stage = Stage::Tiles { count: 1, nanoseconds: took };
+            }
             _ => {}
         }
     }
@@ -157,14 +181,16 @@ impl<'p> Trial<'p> {
     /// Rays were taken, by a tile or a bin; true where all bins are to be traced now.
     #[inline]
     pub fn took(&mut self, count: usize) -> bool {
+        let terms = self.pace.terms;
         match &mut self.stage {
             Stage::Serving => {
                 self.pace.took(count);
                 false
             }
-            Stage::Tiles { count, nanoseconds } if *count == self.terms.tiles => {
+            // A small picture has no time to measure more of what is as slow as that.
+            Stage::Tiles { count, nanoseconds } if *count == terms.tiles || *nanoseconds > terms.slow * UNKNOWN => {
                 let tiles = *nanoseconds / f64::from(*count);
-                if tiles > self.terms.cheap {
+                if tiles > terms.cheap {
                     self.stage = Stage::Stream { tiles, start: Instant::now(), rays: 0 };
                     return true;
                 }
@@ -174,7 +200,7 @@ impl<'p> Trial<'p> {
             Stage::Tiles { .. } => false,
             Stage::Stream { rays, .. } => {
                 *rays += count;
-                *rays >= self.terms.stream
+                *rays >= terms.stream
             }
         }
     }
@@ -193,7 +219,7 @@ impl<'p> Trial<'p> {
     }
 
     fn decide(&mut self, tiles: f64, stream: f64) {
-        self.pace.decide(tiles, stream, self.terms);
+        self.pace.decide(tiles, stream);
         self.stage = Stage::Serving;
     }
 }
@@ -209,12 +235,12 @@ mod tests {
 
     #[test]
     fn a_verdict_serves_its_term() {
-        let pace = Pace::default();
+        let pace = Pace::new(&TILES);
         for (tiles, term, turn) in
             [(200.0, 2 * TILES.retry, Turn::Stream), (1e6, TILES.term, Turn::Stream), (50.0, TILES.term, Turn::Tile)]
         {
             assert_eq!(pace.turn(), Turn::Both);
-            pace.decide(tiles, 100.0, &TILES);
+            pace.decide(tiles, 100.0);
             assert_eq!(pace.turn(), turn);
             pace.took(term - 1);
             assert_eq!(pace.turn(), turn);
@@ -224,42 +250,38 @@ mod tests {
 
     #[test]
     fn slow_tiles_are_compared_with_a_stream() {
-        let pace = Pace::default();
-        streams_win(&pace, &mut Trial::new(&pace, &TILES));
+        let pace = Pace::new(&TILES);
+        streams_win(&pace, &mut Trial::new(&pace));
     }
 
     #[test]
     fn one_slow_tile_ends_the_term_of_those_before() {
-        let pace = Pace::default();
-        pace.decide(20.0, UNKNOWN, &TILES);
-        let mut trial = Trial::new(&pace, &TILES);
+        let pace = Pace::new(&TILES);
+        pace.decide(20.0, UNKNOWN);
+        let mut trial = Trial::new(&pace);
         trial.traced_tile(Instant::now(), usize::MAX);
-        assert!(!trial.took(8) && trial.wants_tiles(true));
-        trial.traced_tile(a_millisecond_ago(), 8);
         assert!(!trial.took(8));
         streams_win(&pace, &mut trial);
     }
 
     #[test]
     fn a_slow_tile_among_fast_ones_changes_nothing() {
-        let pace = Pace::default();
-        pace.decide(20.0, UNKNOWN, &TILES);
-        let mut trial = Trial::new(&pace, &TILES);
-        trial.traced_tile(a_millisecond_ago(), 8);
-        for _ in 0..=TILES.tiles {
+        let pace = Pace::new(&TILES);
+        pace.decide(20.0, 50.0);
+        let mut trial = Trial::new(&pace);
+        trial.traced_tile(a_millisecond_ago(), 2500); // 400 nanoseconds a ray
+        for _ in 0..TILES.tiles {
             assert!(trial.wants_tiles(true) && !trial.took(8));
             trial.traced_tile(Instant::now(), usize::MAX);
         }
         assert_eq!(pace.turn(), Turn::Tile);
     }
 
-    /// Slow tiles, and a stream that is faster.
+    /// A very slow tile, and a stream that is faster.
     fn streams_win(pace: &Pace, trial: &mut Trial<'_>) {
-        for count in 1..=TILES.tiles {
-            assert!(trial.wants_tiles(true));
-            trial.traced_tile(a_millisecond_ago(), 8);
-            assert_eq!(trial.took(8), count == TILES.tiles);
-        }
+        assert!(trial.wants_tiles(true));
+        trial.traced_tile(a_millisecond_ago(), 8);
+        assert!(trial.took(8));
         trial.emptied();
         assert!(!trial.wants_tiles(true) && trial.took(TILES.stream));
         trial.emptied();
@@ -269,8 +291,8 @@ mod tests {
 
     #[test]
     fn nothing_is_measured_while_rays_wait() {
-        let pace = Pace::default();
-        let mut trial = Trial::new(&pace, &PACKETS);
+        let pace = Pace::new(&TILES);
+        let mut trial = Trial::new(&pace);
         assert!(!trial.wants_tiles(false));
         assert!(trial.wants_tiles(true));
         assert!(trial.wants_tiles(false));

@@ -8,7 +8,7 @@ use super::{
     answers::Answers,
     batch::Room,
     frame::Domain,
-    pace::{self, Pace, Trial},
+    pace::{Pace, Trial},
     packet,
     stream::{self, BIN},
     tile::{self, EXTENTS},
@@ -103,14 +103,7 @@ impl<T: Take + ?Sized, const ANY: bool> Kernel for Together<'_, T, ANY> {
 impl<'a, T: Take + ?Sized, const ANY: bool> Together<'a, T, ANY> {
     /// The batch as a kernel; what it learns about its rays goes to `pace`.
     pub fn new(tracer: Tracer<'a>, rays: &'a Rays<'a>, to: &'a mut T, room: &'a mut Room, pace: &'a Pace) -> Self {
-        Self {
-            tracer,
-            rays,
-            to,
-            room,
-            trial: Trial::new(pace, if ANY { &pace::PACKETS } else { &pace::TILES }),
-            ripe: 0,
-        }
+        Self { tracer, rays, to, room, trial: Trial::new(pace), ripe: 0 }
     }
 
     #[inline(always)]
