@@ -197,12 +197,7 @@ impl<'a> Reader<'a> {
     #[inline(always)]
     pub fn rows(&self, triangle: u32) -> [&'a [f32; 4]; 3] {
         let [a, b, c] = self.triangles[triangle as usize];
-        [self.row(a), self.row(b), self.row(c)]
-    }
-
-    #[inline(always)]
-    fn row(&self, vertex: u32) -> &'a [f32; 4] {
-        self.numbers[3 * vertex as usize..].first_chunk().expect("a vertex has three coordinates, the last one four")
+        [self.numbers(a), self.numbers(b), self.numbers(c)]
     }
 
     #[inline(always)]
@@ -225,8 +220,8 @@ impl<'a> Reader<'a> {
 
     /// The coordinates of a vertex, and a number behind them.
     #[inline(always)]
-    pub fn numbers(&self, index: u32) -> &'a [f32] {
-        &self.numbers[3 * index as usize..3 * index as usize + 4]
+    pub fn numbers(&self, index: u32) -> &'a [f32; 4] {
+        self.numbers[3 * index as usize..].first_chunk().expect("a number stands behind the last vertex")
     }
 
     #[inline(always)]
