@@ -32,19 +32,16 @@ impl Separator {
     /// by a rounding error, which callers make room for by dilating the box.
     pub fn overlaps(&self, centre: Vec3, half: Vec3) -> bool {
         let corners = self.corners.map(|corner| corner - centre);
-        let reach = |axis: Vec3| axis.abs().dot(half);
-        if self.normal.dot(corners[0]).abs() > reach(self.normal) {
-            return false;
-        }
-        self.edges.iter().all(|&edge| {
-            let axes =
-                [Vec3::new(0.0, -edge.z, edge.y), Vec3::new(edge.z, 0.0, -edge.x), Vec3::new(-edge.y, edge.x, 0.0)];
-            axes.into_iter().all(|axis| {
-                let [p, q, r] = corners.map(|corner| axis.dot(corner));
-                let radius = reach(axis);
-                p.min(q).min(r) <= radius && p.max(q).max(r) >= -radius
+        // Of all corners: the normal of a needle is made of rounding errors, and they are not in a plane across it.
+        let meets = |axis: Vec3| {
+            let [p, q, r] = corners.map(|corner| axis.dot(corner));
+            let reach = axis.abs().dot(half);
+            p.min(q).min(r) <= reach && p.max(q).max(r) >= -reach
+        };
+        meets(self.normal)
+            && self.edges.iter().all(|&Vec3 { x, y, z }| {
+                [Vec3::new(0.0, -z, y), Vec3::new(z, 0.0, -x), Vec3::new(-y, x, 0.0)].into_iter().all(meets)
             })
-        })
     }
 }
 
@@ -70,6 +67,18 @@ mod tests {
             };
             assert!(cell(0.0, 0.0, 0.5) && cell(1.0, 2.0, 0.5));
             assert!(!cell(3.0, 3.0, 0.5) && !cell(1.0, 1.0, 1.1));
+        }
+    }
+
+    #[test]
+    fn a_needle_is_in_every_box_along_it() {
+        let ends =
+            [Vec3::new(-0.822_735_9, 0.746_449, 0.348_250_5), Vec3::new(-2.526_566_5, 1.611_180_3, -0.862_926_1)];
+        let between = Vec3::new(-1.504_268_2, 1.092_341_5, -0.136_220_16);
+        let triangle = Separator::new([ends[0], ends[1], between]);
+        for step in 0..=100 {
+            let place = ends[0].lerp(ends[1], step as f32 / 100.0);
+            assert!(triangle.overlaps(place, Vec3::splat(1e-4)), "{step}");
         }
     }
 }
