@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use crate::{
     Error,
-    simd::{Simd, read_alone},
+    simd::{Arithmetic, Simd, read_alone},
     traverse::frame::{Domain, Frame},
     triangle::LANES,
 };
@@ -181,6 +181,17 @@ impl<'a> Rays<'a> {
             self.tmin.eight(simd, index),
             self.tmax.eight(simd, index),
         ]
+    }
+
+    /// Rays `index` to `index + 15`, likewise.
+    #[inline(always)]
+    pub(crate) fn sixteen<S: Simd>(&self, simd: S, index: usize) -> [<S::Wide as Arithmetic>::F32; 8] {
+        let (low, high) = (self.eight(simd, index), self.eight(simd, index + LANES));
+        let mut columns = [simd.both([low[0], high[0]]); 8];
+        for k in 1..8 {
+            columns[k] = simd.both([low[k], high[k]]);
+        }
+        columns
     }
 
     /// Whether rays `index` and `index + 7` are there and start at one point.

@@ -1,4 +1,4 @@
-//! Eight lanes of single precision, one implementation per instruction set.
+//! Vectors of eight and of sixteen lanes of single precision, one implementation per instruction set.
 //!
 //! A value of a type that implements [`Simd`] proves that the processor has the instruction set: only [`Level::detect`]
 //! makes one. Kernels are written once, generic over the token, and enter through [`Level::run`].
@@ -11,56 +11,32 @@ mod neon;
 mod portable;
 #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
 mod shuffles;
+mod twice;
+#[cfg(target_arch = "x86_64")]
+mod wide;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
 #[cfg(target_arch = "aarch64")]
 pub use neon::Neon;
 pub use portable::Portable;
+pub use twice::Twice;
 #[cfg(target_arch = "x86_64")]
 pub use x86::{Avx2, Avx512};
 
-/// Operations on eight lanes.
+/// Arithmetic on vectors of some number of lanes, which are numbered from 0.
 ///
 /// `min` and `max` return their second argument where either is not a number, as x86 does; kernels rely on that.
-pub trait Simd: Copy + Send + Sync + 'static {
-    /// Lists of ids are handled in groups of this many.
-    const GROUP: usize = 8;
-
-    /// Eight numbers.
+pub trait Arithmetic: Copy + Send + Sync + 'static {
+    /// A bit for every lane.
+    const ALL: u32;
+    /// A number in every lane.
     type F32: Copy;
-    /// Eight numbers in double precision.
-    type F64: Copy;
 
-    /// Compile `kernel` for this instruction set and run it.
-    fn run<K: Kernel>(self, kernel: K) -> K::Output;
-    /// Eight copies.
+    /// A copy in every lane.
     fn splat(self, value: f32) -> Self::F32;
-    /// Eight numbers from memory.
-    fn load(self, values: &[f32; 8]) -> Self::F32;
-    /// Twice four numbers from memory.
-    fn join(self, low: &[f32; 4], high: &[f32; 4]) -> Self::F32;
-    /// Eight numbers to memory.
-    fn store(self, value: Self::F32) -> [f32; 8];
     /// a + b
     fn add(self, a: Self::F32, b: Self::F32) -> Self::F32;
-    /// a / b
-    fn div(self, a: Self::F32, b: Self::F32) -> Self::F32;
-    /// The bits that are set in both.
-    fn and(self, a: Self::F32, b: Self::F32) -> Self::F32;
-    /// The bits that are set in one or the other.
-    fn or(self, a: Self::F32, b: Self::F32) -> Self::F32;
-    /// The difference of the bits as integers.
-    fn sub_bits(self, a: Self::F32, b: Self::F32) -> Self::F32;
-    /// Where a >= b the first choice, elsewhere the second.
-    fn if_ge(self, a: Self::F32, b: Self::F32, first: Self::F32, second: Self::F32) -> Self::F32;
-    /// Rows to columns.
-    fn transpose(self, rows: [Self::F32; 8]) -> [Self::F32; 8];
-    /// The magnitude of each.
-    #[inline(always)]
-    fn abs(self, value: Self::F32) -> Self::F32 {
-        self.and(value, self.splat(f32::from_bits(i32::MAX as u32)))
-    }
     /// a - b
     fn sub(self, a: Self::F32, b: Self::F32) -> Self::F32;
     /// a * b
@@ -69,12 +45,61 @@ pub trait Simd: Copy + Send + Sync + 'static {
     fn mul_add(self, a: Self::F32, b: Self::F32, c: Self::F32) -> Self::F32;
     /// a * b - c, rounded once or twice
     fn mul_sub(self, a: Self::F32, b: Self::F32, c: Self::F32) -> Self::F32;
+    /// a / b
+    fn div(self, a: Self::F32, b: Self::F32) -> Self::F32;
     /// The lesser of each pair.
     fn min(self, a: Self::F32, b: Self::F32) -> Self::F32;
     /// The greater of each pair.
     fn max(self, a: Self::F32, b: Self::F32) -> Self::F32;
+    /// The bits that are set in both.
+    fn and(self, a: Self::F32, b: Self::F32) -> Self::F32;
+    /// The bits that are set in one or the other.
+    fn or(self, a: Self::F32, b: Self::F32) -> Self::F32;
+    /// The bits that are set in one and not in the other.
+    fn xor(self, a: Self::F32, b: Self::F32) -> Self::F32;
+    /// The difference of the bits as integers.
+    fn sub_bits(self, a: Self::F32, b: Self::F32) -> Self::F32;
+    /// Where a >= b the first choice, elsewhere the second.
+    fn if_ge(self, a: Self::F32, b: Self::F32, first: Self::F32, second: Self::F32) -> Self::F32;
     /// Bit `i` is set where lane `i` has a <= b.
     fn le(self, a: Self::F32, b: Self::F32) -> u32;
+    /// The magnitude of each.
+    #[inline(always)]
+    fn abs(self, value: Self::F32) -> Self::F32 {
+        self.and(value, self.splat(f32::from_bits(i32::MAX as u32)))
+    }
+}
+
+/// Operations on eight lanes.
+pub trait Simd: Arithmetic {
+    /// Lists of ids are handled in groups of this many.
+    const GROUP: usize = 8;
+
+    /// Eight numbers in double precision.
+    type F64: Copy;
+    /// The same instruction set on sixteen lanes.
+    type Wide: Arithmetic;
+
+    /// Compile `kernel` for this instruction set and run it.
+    fn run<K: Kernel>(self, kernel: K) -> K::Output;
+    /// The token for sixteen lanes.
+    fn wide(self) -> Self::Wide;
+    /// Sixteen lanes from twice eight.
+    fn both(self, halves: [Self::F32; 2]) -> <Self::Wide as Arithmetic>::F32;
+    /// Twice eight lanes from sixteen.
+    fn halves(self, value: <Self::Wide as Arithmetic>::F32) -> [Self::F32; 2];
+    /// Eight numbers from memory.
+    fn load(self, values: &[f32; 8]) -> Self::F32;
+    /// Sixteen numbers from memory.
+    fn load_wide(self, values: &[f32; 16]) -> <Self::Wide as Arithmetic>::F32;
+    /// Twice four numbers from memory.
+    fn join(self, low: &[f32; 4], high: &[f32; 4]) -> Self::F32;
+    /// Eight numbers to memory.
+    fn store(self, value: Self::F32) -> [f32; 8];
+    /// Sixteen numbers to memory.
+    fn store_wide(self, value: <Self::Wide as Arithmetic>::F32) -> [f32; 16];
+    /// Rows to columns.
+    fn transpose(self, rows: [Self::F32; 8]) -> [Self::F32; 8];
     /// Bit `i` is set where lane `i` has a < 0 < b.
     fn straddles_zero(self, a: Self::F32, b: Self::F32) -> u32;
     /// The same numbers in double precision.

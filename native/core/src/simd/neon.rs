@@ -2,7 +2,7 @@
 
 use std::arch::aarch64::*;
 
-use super::{Kernel, Simd, shuffles::SHUFFLES};
+use super::{Arithmetic, Kernel, Simd, Twice, shuffles::SHUFFLES, twice};
 
 /// Proof that the processor has NEON.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -77,19 +77,104 @@ fn bits(_: Neon, [low, high]: [uint32x4_t; 2]) -> u32 {
     }
 }
 
-impl Simd for Neon {
+impl Arithmetic for Neon {
+    const ALL: u32 = 0xff;
     type F32 = Pair;
+
+    #[inline(always)]
+    fn splat(self, value: f32) -> Pair {
+        // SAFETY: a token exists only where NEON was detected.
+        unsafe { [vdupq_n_f32(value); 2] }
+    }
+    #[inline(always)]
+    fn add(self, a: Pair, b: Pair) -> Pair {
+        halves!(a, b => vaddq_f32(a, b))
+    }
+    #[inline(always)]
+    fn sub(self, a: Pair, b: Pair) -> Pair {
+        halves!(a, b => vsubq_f32(a, b))
+    }
+    #[inline(always)]
+    fn mul(self, a: Pair, b: Pair) -> Pair {
+        halves!(a, b => vmulq_f32(a, b))
+    }
+    #[inline(always)]
+    fn mul_add(self, a: Pair, b: Pair, c: Pair) -> Pair {
+        halves!(a, b, c => vfmaq_f32(c, a, b))
+    }
+    #[inline(always)]
+    fn mul_sub(self, a: Pair, b: Pair, c: Pair) -> Pair {
+        halves!(a, b, c => vnegq_f32(vfmsq_f32(c, a, b)))
+    }
+    #[inline(always)]
+    fn div(self, a: Pair, b: Pair) -> Pair {
+        halves!(a, b => vdivq_f32(a, b))
+    }
+    #[inline(always)]
+    fn min(self, a: Pair, b: Pair) -> Pair {
+        // Not `vminq_f32`: that returns not-a-number where either argument is.
+        halves!(a, b => vbslq_f32(vcltq_f32(a, b), a, b))
+    }
+    #[inline(always)]
+    fn max(self, a: Pair, b: Pair) -> Pair {
+        halves!(a, b => vbslq_f32(vcgtq_f32(a, b), a, b))
+    }
+    #[inline(always)]
+    fn and(self, a: Pair, b: Pair) -> Pair {
+        halves!(a, b => vreinterpretq_f32_u32(vandq_u32(vreinterpretq_u32_f32(a), vreinterpretq_u32_f32(b))))
+    }
+    #[inline(always)]
+    fn or(self, a: Pair, b: Pair) -> Pair {
+        halves!(a, b => vreinterpretq_f32_u32(vorrq_u32(vreinterpretq_u32_f32(a), vreinterpretq_u32_f32(b))))
+    }
+    #[inline(always)]
+    fn xor(self, a: Pair, b: Pair) -> Pair {
+        halves!(a, b => vreinterpretq_f32_u32(veorq_u32(vreinterpretq_u32_f32(a), vreinterpretq_u32_f32(b))))
+    }
+    #[inline(always)]
+    fn sub_bits(self, a: Pair, b: Pair) -> Pair {
+        halves!(a, b => vreinterpretq_f32_u32(vsubq_u32(vreinterpretq_u32_f32(a), vreinterpretq_u32_f32(b))))
+    }
+    #[inline(always)]
+    fn if_ge(self, a: Pair, b: Pair, first: Pair, second: Pair) -> Pair {
+        halves!(a, b, first, second => vbslq_f32(vcgeq_f32(a, b), first, second))
+    }
+    #[inline(always)]
+    fn le(self, a: Pair, b: Pair) -> u32 {
+        bits(self, halves!(a, b => vcleq_f32(a, b)))
+    }
+}
+
+impl Simd for Neon {
     type F64 = Quad;
+    type Wide = Twice<Self>;
+
+    #[inline(always)]
+    fn wide(self) -> Twice<Self> {
+        Twice(self)
+    }
+    #[inline(always)]
+    fn both(self, halves: [Pair; 2]) -> [Pair; 2] {
+        halves
+    }
+    #[inline(always)]
+    fn halves(self, value: [Pair; 2]) -> [Pair; 2] {
+        value
+    }
+    #[inline(always)]
+    fn load_wide(self, values: &[f32; 16]) -> [Pair; 2] {
+        let [low, high] = twice::halves(values);
+        [self.load(low), self.load(high)]
+    }
+    #[inline(always)]
+    fn store_wide(self, value: [Pair; 2]) -> [f32; 16] {
+        bytemuck::cast([self.store(value[0]), self.store(value[1])])
+    }
 
     #[inline]
     fn run<K: Kernel>(self, kernel: K) -> K::Output {
         // SAFETY: a token exists only where NEON was detected.
         unsafe { enter_neon(self, kernel) }
-    }
-    #[inline(always)]
-    fn splat(self, value: f32) -> Pair {
-        // SAFETY: a token exists only where NEON was detected.
-        unsafe { [vdupq_n_f32(value); 2] }
     }
     #[inline(always)]
     fn load(self, values: &[f32; 8]) -> Pair {
@@ -112,62 +197,9 @@ impl Simd for Neon {
         values
     }
     #[inline(always)]
-    fn add(self, a: Pair, b: Pair) -> Pair {
-        halves!(a, b => vaddq_f32(a, b))
-    }
-    #[inline(always)]
-    fn div(self, a: Pair, b: Pair) -> Pair {
-        halves!(a, b => vdivq_f32(a, b))
-    }
-    #[inline(always)]
-    fn and(self, a: Pair, b: Pair) -> Pair {
-        halves!(a, b => vreinterpretq_f32_u32(vandq_u32(vreinterpretq_u32_f32(a), vreinterpretq_u32_f32(b))))
-    }
-    #[inline(always)]
-    fn or(self, a: Pair, b: Pair) -> Pair {
-        halves!(a, b => vreinterpretq_f32_u32(vorrq_u32(vreinterpretq_u32_f32(a), vreinterpretq_u32_f32(b))))
-    }
-    #[inline(always)]
-    fn sub_bits(self, a: Pair, b: Pair) -> Pair {
-        halves!(a, b => vreinterpretq_f32_u32(vsubq_u32(vreinterpretq_u32_f32(a), vreinterpretq_u32_f32(b))))
-    }
-    #[inline(always)]
-    fn if_ge(self, a: Pair, b: Pair, first: Pair, second: Pair) -> Pair {
-        halves!(a, b, first, second => vbslq_f32(vcgeq_f32(a, b), first, second))
-    }
-    #[inline(always)]
     fn transpose(self, rows: [Pair; 8]) -> [Pair; 8] {
         let rows = rows.map(|row| self.store(row));
         std::array::from_fn(|column| self.load(&std::array::from_fn(|row| rows[row][column])))
-    }
-    #[inline(always)]
-    fn sub(self, a: Pair, b: Pair) -> Pair {
-        halves!(a, b => vsubq_f32(a, b))
-    }
-    #[inline(always)]
-    fn mul(self, a: Pair, b: Pair) -> Pair {
-        halves!(a, b => vmulq_f32(a, b))
-    }
-    #[inline(always)]
-    fn mul_add(self, a: Pair, b: Pair, c: Pair) -> Pair {
-        halves!(a, b, c => vfmaq_f32(c, a, b))
-    }
-    #[inline(always)]
-    fn mul_sub(self, a: Pair, b: Pair, c: Pair) -> Pair {
-        halves!(a, b, c => vnegq_f32(vfmsq_f32(c, a, b)))
-    }
-    #[inline(always)]
-    fn min(self, a: Pair, b: Pair) -> Pair {
-        // Not `vminq_f32`: that returns not-a-number where either argument is.
-        halves!(a, b => vbslq_f32(vcltq_f32(a, b), a, b))
-    }
-    #[inline(always)]
-    fn max(self, a: Pair, b: Pair) -> Pair {
-        halves!(a, b => vbslq_f32(vcgtq_f32(a, b), a, b))
-    }
-    #[inline(always)]
-    fn le(self, a: Pair, b: Pair) -> u32 {
-        bits(self, halves!(a, b => vcleq_f32(a, b)))
     }
     #[inline(always)]
     fn straddles_zero(self, a: Pair, b: Pair) -> u32 {

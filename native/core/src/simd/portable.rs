@@ -1,6 +1,6 @@
 //! Plain arrays, which compilers turn into whatever vectors the target is known to have.
 
-use super::{Kernel, Simd};
+use super::{Arithmetic, Kernel, Simd, Twice, twice};
 
 /// Needs nothing, so anybody may make one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -16,57 +16,17 @@ fn bits(f: impl Fn(usize) -> bool) -> u32 {
     (0..8).fold(0, |mask, i| mask | u32::from(f(i)) << i)
 }
 
-impl Simd for Portable {
+impl Arithmetic for Portable {
+    const ALL: u32 = 0xff;
     type F32 = [f32; 8];
-    type F64 = [f64; 8];
 
-    #[inline]
-    fn run<K: Kernel>(self, kernel: K) -> K::Output {
-        kernel.run(self)
-    }
     #[inline(always)]
     fn splat(self, value: f32) -> [f32; 8] {
         [value; 8]
     }
     #[inline(always)]
-    fn load(self, values: &[f32; 8]) -> [f32; 8] {
-        *values
-    }
-    #[inline(always)]
-    fn join(self, low: &[f32; 4], high: &[f32; 4]) -> [f32; 8] {
-        bytemuck::cast([*low, *high])
-    }
-    #[inline(always)]
-    fn store(self, value: [f32; 8]) -> [f32; 8] {
-        value
-    }
-    #[inline(always)]
     fn add(self, a: [f32; 8], b: [f32; 8]) -> [f32; 8] {
         zip(a, b, |a, b| a + b)
-    }
-    #[inline(always)]
-    fn div(self, a: [f32; 8], b: [f32; 8]) -> [f32; 8] {
-        zip(a, b, |a, b| a / b)
-    }
-    #[inline(always)]
-    fn and(self, a: [f32; 8], b: [f32; 8]) -> [f32; 8] {
-        zip(a, b, |a, b| f32::from_bits(a.to_bits() & b.to_bits()))
-    }
-    #[inline(always)]
-    fn or(self, a: [f32; 8], b: [f32; 8]) -> [f32; 8] {
-        zip(a, b, |a, b| f32::from_bits(a.to_bits() | b.to_bits()))
-    }
-    #[inline(always)]
-    fn sub_bits(self, a: [f32; 8], b: [f32; 8]) -> [f32; 8] {
-        zip(a, b, |a, b| f32::from_bits(a.to_bits().wrapping_sub(b.to_bits())))
-    }
-    #[inline(always)]
-    fn if_ge(self, a: [f32; 8], b: [f32; 8], first: [f32; 8], second: [f32; 8]) -> [f32; 8] {
-        std::array::from_fn(|i| if a[i] >= b[i] { first[i] } else { second[i] })
-    }
-    #[inline(always)]
-    fn transpose(self, rows: [[f32; 8]; 8]) -> [[f32; 8]; 8] {
-        std::array::from_fn(|column| std::array::from_fn(|row| rows[row][column]))
     }
     #[inline(always)]
     fn sub(self, a: [f32; 8], b: [f32; 8]) -> [f32; 8] {
@@ -85,6 +45,10 @@ impl Simd for Portable {
         std::array::from_fn(|i| a[i] * b[i] - c[i])
     }
     #[inline(always)]
+    fn div(self, a: [f32; 8], b: [f32; 8]) -> [f32; 8] {
+        zip(a, b, |a, b| a / b)
+    }
+    #[inline(always)]
     fn min(self, a: [f32; 8], b: [f32; 8]) -> [f32; 8] {
         zip(a, b, |a, b| if a < b { a } else { b })
     }
@@ -93,8 +57,76 @@ impl Simd for Portable {
         zip(a, b, |a, b| if a > b { a } else { b })
     }
     #[inline(always)]
+    fn and(self, a: [f32; 8], b: [f32; 8]) -> [f32; 8] {
+        zip(a, b, |a, b| f32::from_bits(a.to_bits() & b.to_bits()))
+    }
+    #[inline(always)]
+    fn or(self, a: [f32; 8], b: [f32; 8]) -> [f32; 8] {
+        zip(a, b, |a, b| f32::from_bits(a.to_bits() | b.to_bits()))
+    }
+    #[inline(always)]
+    fn xor(self, a: [f32; 8], b: [f32; 8]) -> [f32; 8] {
+        zip(a, b, |a, b| f32::from_bits(a.to_bits() ^ b.to_bits()))
+    }
+    #[inline(always)]
+    fn sub_bits(self, a: [f32; 8], b: [f32; 8]) -> [f32; 8] {
+        zip(a, b, |a, b| f32::from_bits(a.to_bits().wrapping_sub(b.to_bits())))
+    }
+    #[inline(always)]
+    fn if_ge(self, a: [f32; 8], b: [f32; 8], first: [f32; 8], second: [f32; 8]) -> [f32; 8] {
+        std::array::from_fn(|i| if a[i] >= b[i] { first[i] } else { second[i] })
+    }
+    #[inline(always)]
     fn le(self, a: [f32; 8], b: [f32; 8]) -> u32 {
         bits(|i| a[i] <= b[i])
+    }
+}
+
+impl Simd for Portable {
+    type F64 = [f64; 8];
+    type Wide = Twice<Self>;
+
+    #[inline(always)]
+    fn wide(self) -> Twice<Self> {
+        Twice(self)
+    }
+    #[inline(always)]
+    fn both(self, halves: [[f32; 8]; 2]) -> [[f32; 8]; 2] {
+        halves
+    }
+    #[inline(always)]
+    fn halves(self, value: [[f32; 8]; 2]) -> [[f32; 8]; 2] {
+        value
+    }
+    #[inline(always)]
+    fn load_wide(self, values: &[f32; 16]) -> [[f32; 8]; 2] {
+        let [low, high] = twice::halves(values);
+        [self.load(low), self.load(high)]
+    }
+    #[inline(always)]
+    fn store_wide(self, value: [[f32; 8]; 2]) -> [f32; 16] {
+        bytemuck::cast([self.store(value[0]), self.store(value[1])])
+    }
+
+    #[inline]
+    fn run<K: Kernel>(self, kernel: K) -> K::Output {
+        kernel.run(self)
+    }
+    #[inline(always)]
+    fn load(self, values: &[f32; 8]) -> [f32; 8] {
+        *values
+    }
+    #[inline(always)]
+    fn join(self, low: &[f32; 4], high: &[f32; 4]) -> [f32; 8] {
+        bytemuck::cast([*low, *high])
+    }
+    #[inline(always)]
+    fn store(self, value: [f32; 8]) -> [f32; 8] {
+        value
+    }
+    #[inline(always)]
+    fn transpose(self, rows: [[f32; 8]; 8]) -> [[f32; 8]; 8] {
+        std::array::from_fn(|column| std::array::from_fn(|row| rows[row][column]))
     }
     #[inline(always)]
     fn straddles_zero(self, a: [f32; 8], b: [f32; 8]) -> u32 {

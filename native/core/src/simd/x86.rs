@@ -2,7 +2,7 @@
 
 use std::arch::x86_64::*;
 
-use super::{Kernel, MOST_GROUP, Simd, shuffles::SHUFFLES};
+use super::{Arithmetic, Kernel, MOST_GROUP, Simd, Twice, shuffles::SHUFFLES, twice, wide::Zmm};
 
 /// Proof that the processor has AVX2, FMA, BMI1, BMI2, LZCNT and POPCNT.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -51,11 +51,85 @@ fn enter_avx512<K: Kernel>(token: Avx512, kernel: K) -> K::Output {
 /// The operations on 256-bit vectors that both tokens share.
 macro_rules! arithmetic {
     () => {
+        const ALL: u32 = 0xff;
+        type F32 = __m256;
+
         #[inline(always)]
         fn splat(self, value: f32) -> __m256 {
             // SAFETY: a token exists only where AVX was detected.
             unsafe { _mm256_set1_ps(value) }
         }
+        #[inline(always)]
+        fn add(self, a: __m256, b: __m256) -> __m256 {
+            // SAFETY: as for `splat`.
+            unsafe { _mm256_add_ps(a, b) }
+        }
+        #[inline(always)]
+        fn sub(self, a: __m256, b: __m256) -> __m256 {
+            // SAFETY: as for `splat`.
+            unsafe { _mm256_sub_ps(a, b) }
+        }
+        #[inline(always)]
+        fn mul(self, a: __m256, b: __m256) -> __m256 {
+            // SAFETY: as for `splat`.
+            unsafe { _mm256_mul_ps(a, b) }
+        }
+        #[inline(always)]
+        fn mul_add(self, a: __m256, b: __m256, c: __m256) -> __m256 {
+            // SAFETY: a token exists only where FMA was detected.
+            unsafe { _mm256_fmadd_ps(a, b, c) }
+        }
+        #[inline(always)]
+        fn mul_sub(self, a: __m256, b: __m256, c: __m256) -> __m256 {
+            // SAFETY: a token exists only where FMA was detected.
+            unsafe { _mm256_fmsub_ps(a, b, c) }
+        }
+        #[inline(always)]
+        fn div(self, a: __m256, b: __m256) -> __m256 {
+            // SAFETY: as for `splat`.
+            unsafe { _mm256_div_ps(a, b) }
+        }
+        #[inline(always)]
+        fn min(self, a: __m256, b: __m256) -> __m256 {
+            // SAFETY: as for `splat`.
+            unsafe { _mm256_min_ps(a, b) }
+        }
+        #[inline(always)]
+        fn max(self, a: __m256, b: __m256) -> __m256 {
+            // SAFETY: as for `splat`.
+            unsafe { _mm256_max_ps(a, b) }
+        }
+        #[inline(always)]
+        fn and(self, a: __m256, b: __m256) -> __m256 {
+            // SAFETY: as for `splat`.
+            unsafe { _mm256_and_ps(a, b) }
+        }
+        #[inline(always)]
+        fn or(self, a: __m256, b: __m256) -> __m256 {
+            // SAFETY: as for `splat`.
+            unsafe { _mm256_or_ps(a, b) }
+        }
+        #[inline(always)]
+        fn xor(self, a: __m256, b: __m256) -> __m256 {
+            // SAFETY: as for `splat`.
+            unsafe { _mm256_xor_ps(a, b) }
+        }
+        #[inline(always)]
+        fn sub_bits(self, a: __m256, b: __m256) -> __m256 {
+            // SAFETY: a token exists only where AVX2 was detected.
+            unsafe { _mm256_castsi256_ps(_mm256_sub_epi32(_mm256_castps_si256(a), _mm256_castps_si256(b))) }
+        }
+        #[inline(always)]
+        fn if_ge(self, a: __m256, b: __m256, first: __m256, second: __m256) -> __m256 {
+            // SAFETY: as for `splat`.
+            unsafe { _mm256_blendv_ps(second, first, _mm256_cmp_ps::<_CMP_GE_OQ>(a, b)) }
+        }
+    };
+}
+
+/// What else both tokens do with these vectors.
+macro_rules! vectors {
+    () => {
         #[inline(always)]
         fn load(self, values: &[f32; 8]) -> __m256 {
             // SAFETY: as for `splat`; the reference is to 32 readable bytes and the load asks for no alignment.
@@ -72,36 +146,6 @@ macro_rules! arithmetic {
             // SAFETY: as for `splat`; the array is 32 writable bytes and the store asks for no alignment.
             unsafe { _mm256_storeu_ps(values.as_mut_ptr(), value) };
             values
-        }
-        #[inline(always)]
-        fn add(self, a: __m256, b: __m256) -> __m256 {
-            // SAFETY: as for `splat`.
-            unsafe { _mm256_add_ps(a, b) }
-        }
-        #[inline(always)]
-        fn div(self, a: __m256, b: __m256) -> __m256 {
-            // SAFETY: as for `splat`.
-            unsafe { _mm256_div_ps(a, b) }
-        }
-        #[inline(always)]
-        fn and(self, a: __m256, b: __m256) -> __m256 {
-            // SAFETY: as for `splat`.
-            unsafe { _mm256_and_ps(a, b) }
-        }
-        #[inline(always)]
-        fn or(self, a: __m256, b: __m256) -> __m256 {
-            // SAFETY: as for `splat`.
-            unsafe { _mm256_or_ps(a, b) }
-        }
-        #[inline(always)]
-        fn sub_bits(self, a: __m256, b: __m256) -> __m256 {
-            // SAFETY: a token exists only where AVX2 was detected.
-            unsafe { _mm256_castsi256_ps(_mm256_sub_epi32(_mm256_castps_si256(a), _mm256_castps_si256(b))) }
-        }
-        #[inline(always)]
-        fn if_ge(self, a: __m256, b: __m256, first: __m256, second: __m256) -> __m256 {
-            // SAFETY: as for `splat`.
-            unsafe { _mm256_blendv_ps(second, first, _mm256_cmp_ps::<_CMP_GE_OQ>(a, b)) }
         }
         #[inline(always)]
         fn transpose(self, r: [__m256; 8]) -> [__m256; 8] {
@@ -134,36 +178,6 @@ macro_rules! arithmetic {
                     _mm256_permute2f128_ps::<0x31>(b3, b7),
                 ]
             }
-        }
-        #[inline(always)]
-        fn sub(self, a: __m256, b: __m256) -> __m256 {
-            // SAFETY: as for `splat`.
-            unsafe { _mm256_sub_ps(a, b) }
-        }
-        #[inline(always)]
-        fn mul(self, a: __m256, b: __m256) -> __m256 {
-            // SAFETY: as for `splat`.
-            unsafe { _mm256_mul_ps(a, b) }
-        }
-        #[inline(always)]
-        fn mul_add(self, a: __m256, b: __m256, c: __m256) -> __m256 {
-            // SAFETY: a token exists only where FMA was detected.
-            unsafe { _mm256_fmadd_ps(a, b, c) }
-        }
-        #[inline(always)]
-        fn mul_sub(self, a: __m256, b: __m256, c: __m256) -> __m256 {
-            // SAFETY: a token exists only where FMA was detected.
-            unsafe { _mm256_fmsub_ps(a, b, c) }
-        }
-        #[inline(always)]
-        fn min(self, a: __m256, b: __m256) -> __m256 {
-            // SAFETY: as for `splat`.
-            unsafe { _mm256_min_ps(a, b) }
-        }
-        #[inline(always)]
-        fn max(self, a: __m256, b: __m256) -> __m256 {
-            // SAFETY: as for `splat`.
-            unsafe { _mm256_max_ps(a, b) }
         }
         #[inline(always)]
         fn prefetch<T>(self, value: &T) {
@@ -230,21 +244,46 @@ macro_rules! arithmetic {
     };
 }
 
-impl Simd for Avx2 {
-    type F32 = __m256;
-    type F64 = [__m256d; 2];
-
-    #[inline]
-    fn run<K: Kernel>(self, kernel: K) -> K::Output {
-        // SAFETY: a token exists only where every feature of `enter_avx2` was detected.
-        unsafe { enter_avx2(self, kernel) }
-    }
+impl Arithmetic for Avx2 {
     arithmetic!();
     #[inline(always)]
     fn le(self, a: __m256, b: __m256) -> u32 {
         // SAFETY: as for `splat`.
         unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(a, b)) as u32 }
     }
+}
+
+impl Simd for Avx2 {
+    type F64 = [__m256d; 2];
+    type Wide = Twice<Self>;
+
+    #[inline(always)]
+    fn wide(self) -> Twice<Self> {
+        Twice(self)
+    }
+    #[inline(always)]
+    fn both(self, halves: [__m256; 2]) -> [__m256; 2] {
+        halves
+    }
+    #[inline(always)]
+    fn halves(self, value: [__m256; 2]) -> [__m256; 2] {
+        value
+    }
+    #[inline(always)]
+    fn load_wide(self, values: &[f32; 16]) -> [__m256; 2] {
+        let [low, high] = twice::halves(values);
+        [self.load(low), self.load(high)]
+    }
+    #[inline(always)]
+    fn store_wide(self, value: [__m256; 2]) -> [f32; 16] {
+        bytemuck::cast([self.store(value[0]), self.store(value[1])])
+    }
+    #[inline]
+    fn run<K: Kernel>(self, kernel: K) -> K::Output {
+        // SAFETY: a token exists only where every feature of `enter_avx2` was detected.
+        unsafe { enter_avx2(self, kernel) }
+    }
+    vectors!();
     #[inline(always)]
     fn straddles_zero(self, a: __m256, b: __m256) -> u32 {
         // SAFETY: as for `splat`.
@@ -276,22 +315,52 @@ impl Simd for Avx2 {
     }
 }
 
-impl Simd for Avx512 {
-    const GROUP: usize = MOST_GROUP;
-    type F32 = __m256;
-    type F64 = [__m256d; 2];
-
-    #[inline]
-    fn run<K: Kernel>(self, kernel: K) -> K::Output {
-        // SAFETY: a token exists only where every feature of `enter_avx512` was detected.
-        unsafe { enter_avx512(self, kernel) }
-    }
+impl Arithmetic for Avx512 {
     arithmetic!();
     #[inline(always)]
     fn le(self, a: __m256, b: __m256) -> u32 {
         // SAFETY: a token exists only where AVX-512 F and VL were detected.
         u32::from(unsafe { _mm256_cmp_ps_mask::<_CMP_LE_OQ>(a, b) })
     }
+}
+
+impl Simd for Avx512 {
+    const GROUP: usize = MOST_GROUP;
+    type F64 = [__m256d; 2];
+    type Wide = Zmm;
+
+    #[inline(always)]
+    fn wide(self) -> Zmm {
+        Zmm::new(self)
+    }
+    #[inline(always)]
+    fn both(self, halves: [__m256; 2]) -> __m512 {
+        // SAFETY: a token exists only where AVX-512 F and DQ were detected.
+        unsafe { _mm512_insertf32x8::<1>(_mm512_castps256_ps512(halves[0]), halves[1]) }
+    }
+    #[inline(always)]
+    fn halves(self, value: __m512) -> [__m256; 2] {
+        // SAFETY: as for `both`.
+        unsafe { [_mm512_castps512_ps256(value), _mm512_extractf32x8_ps::<1>(value)] }
+    }
+    #[inline(always)]
+    fn load_wide(self, values: &[f32; 16]) -> __m512 {
+        // SAFETY: as for `both`; the reference is to 64 readable bytes and the load asks for no alignment.
+        unsafe { _mm512_loadu_ps(values.as_ptr()) }
+    }
+    #[inline(always)]
+    fn store_wide(self, value: __m512) -> [f32; 16] {
+        let mut values = [0.0; 16];
+        // SAFETY: as for `both`; the array is 64 writable bytes and the store asks for no alignment.
+        unsafe { _mm512_storeu_ps(values.as_mut_ptr(), value) };
+        values
+    }
+    #[inline]
+    fn run<K: Kernel>(self, kernel: K) -> K::Output {
+        // SAFETY: a token exists only where every feature of `enter_avx512` was detected.
+        unsafe { enter_avx512(self, kernel) }
+    }
+    vectors!();
     #[inline(always)]
     fn straddles_zero(self, a: __m256, b: __m256) -> u32 {
         // SAFETY: as for `le`.

@@ -53,7 +53,7 @@ impl<'a> Tracer<'a> {
         self.silent::<_, true>(rays, occluded, &Pace::streams())
     }
 
-    /// [`Tracer::occluded`] by packets of eight rays as they come: for rays that begin side by side.
+    /// [`Tracer::occluded`] by packets of sixteen rays as they come: for rays that begin side by side.
     ///
     /// # Errors
     /// [`Error::Ray`] for the first unusable ray.
@@ -123,7 +123,7 @@ pub struct Room {
     pub lists: Lists,
     pub tile: Box<Tile>,
     pub visits: Vec<Visit>,
-    pub packet: Vec<packet::Visit>,
+    pub packet: packet::Memory,
 }
 
 /// Rays that walk alone under the eyes of probes, and what to do with the index, frame, hit (in the frame's units) and

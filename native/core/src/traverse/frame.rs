@@ -24,8 +24,11 @@ use crate::{
 /// Origins beyond this many half extents from the scene's centre are brought near.
 pub const NEAR: f32 = 4.0;
 
-/// Boxes are tested grown by this share of R: 32u, see the module's text.
-pub const DILATION: f32 = 32.0 / (1 << 24) as f32;
+/// Half a unit in the last place of single precision, u in the module's text.
+pub(super) const ROUNDING: f32 = 1.0 / (1 << 24) as f32;
+
+/// Boxes are tested grown by this share of R, see the module's text.
+pub const DILATION: f32 = 32.0 * ROUNDING;
 
 /// Below this share of the largest component, a direction component is treated as zero: over the whole scene it moves
 /// a ray by far less than the dilation, and its inverse stays finite.

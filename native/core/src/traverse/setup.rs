@@ -1,10 +1,13 @@
-//! Eight frames at once: [`Frame::new`] in vectors, operation by operation, so that both give the same bits.
+//! Several frames at once: [`Frame::new`] in vectors, operation by operation, so that both give the same bits.
 
 use super::frame::{DILATION, Domain, Frame, NEAR, PARALLEL};
-use crate::{simd::Simd, triangle::LANES};
+use crate::{
+    simd::{Arithmetic, Simd},
+    triangle::LANES,
+};
 
-/// The frames of eight rays, by column.
-pub struct Frames<S: Simd> {
+/// The frames of a vector's rays, by column.
+pub struct Frames<S: Arithmetic> {
     /// See [`Frame::inverse`].
     pub inverse: [S::F32; 3],
     /// See [`Frame::near_bias`].
@@ -19,12 +22,13 @@ pub struct Frames<S: Simd> {
     pub local: [S::F32; 3],
     /// See [`Frame::direction`].
     pub direction: [S::F32; 3],
-    origin: [S::F32; 3],
+    /// See [`Frame::origin`].
+    pub origin: [S::F32; 3],
     scale: S::F32,
 }
 
-impl<S: Simd> Frames<S> {
-    /// The frames of eight rays, given by column: origin, direction, tmin, tmax. `None` where one of them is unusable
+impl<S: Arithmetic> Frames<S> {
+    /// The frames of rays given by column: origin, direction, tmin, tmax. `None` where one of them is unusable
     /// or begins far away; then [`Frame::new`] is to be asked for each.
     #[inline(always)]
     pub fn new(simd: S, columns: &[S::F32; 8], domain: &Domain) -> Option<Self> {
@@ -47,7 +51,7 @@ impl<S: Simd> Frames<S> {
             & simd.le(largest, simd.splat(1e38))
             & simd.le(reach, simd.splat(NEAR * domain.half_extent))
             & (simd.le(tmin, tmax) | simd.le(tmax, tmin));
-        if sound != 0xff {
+        if sound != S::ALL {
             return None;
         }
 
@@ -68,6 +72,41 @@ impl<S: Simd> Frames<S> {
         }
         let (tmin, tmax) = (simd.mul(tmin, length), simd.mul(tmax, length));
         Some(Self { inverse, near_bias, far_bias, tmin, tmax, local, direction, origin, scale })
+    }
+}
+
+impl<S: Simd> Frames<S> {
+    /// Those of twice eight rays.
+    #[inline(always)]
+    pub fn halves(simd: S, frames: &Frames<S::Wide>) -> [Self; 2] {
+        let Frames { inverse, near_bias, far_bias, tmin, tmax, local, direction, origin, scale } = frames;
+        let (inverse, near_bias, far_bias) = (halves(simd, inverse), halves(simd, near_bias), halves(simd, far_bias));
+        let (local, direction, origin) = (halves(simd, local), halves(simd, direction), halves(simd, origin));
+        let (tmin, tmax, scale) = (simd.halves(*tmin), simd.halves(*tmax), simd.halves(*scale));
+        [
+            Self {
+                inverse: inverse[0],
+                near_bias: near_bias[0],
+                far_bias: far_bias[0],
+                tmin: tmin[0],
+                tmax: tmax[0],
+                local: local[0],
+                direction: direction[0],
+                origin: origin[0],
+                scale: scale[0],
+            },
+            Self {
+                inverse: inverse[1],
+                near_bias: near_bias[1],
+                far_bias: far_bias[1],
+                tmin: tmin[1],
+                tmax: tmax[1],
+                local: local[1],
+                direction: direction[1],
+                origin: origin[1],
+                scale: scale[1],
+            },
+        ]
     }
 
     /// The frames one by one.
@@ -90,6 +129,13 @@ impl<S: Simd> Frames<S> {
                 bytemuck::cast([simd.store(a[lane]), simd.store(b[lane]), simd.store(c[lane]), simd.store(d[lane])]);
         }
     }
+}
+
+/// Three vectors in halves.
+#[inline(always)]
+fn halves<S: Simd>(simd: S, [x, y, z]: &[<S::Wide as Arithmetic>::F32; 3]) -> [[S::F32; 3]; 2] {
+    let (x, y, z) = (simd.halves(*x), simd.halves(*y), simd.halves(*z));
+    [[x[0], y[0], z[0]], [x[1], y[1], z[1]]]
 }
 
 /// The axes of the sheared space, as bits, and the direction over its dominant component.

@@ -46,8 +46,9 @@ impl Take for [bool] {
     }
     #[inline(always)]
     fn take_eight(&mut self, index: usize, hits: &Eight) {
+        let occluded: &mut [bool; LANES] = self[index..].first_chunk_mut().expect("eight rays have eight answers");
         for lane in 0..LANES {
-            self[index + lane] = hits.primitive[lane] != MISS;
+            occluded[lane] = hits.primitive[lane] != MISS;
         }
     }
 }
@@ -165,7 +166,9 @@ impl<'a, T: Take + ?Sized, const ANY: bool> Together<'a, T, ANY> {
         }
         tile::trace::<S, GRIDS>(simd, structure, mesh, tile, visits, stack);
         for group in 0..tile.count {
-            self.to.take_eight(first + group * LANES, &tile.hits(simd, mesh, group));
+            for half in [0, LANES] {
+                self.to.take_eight(first + group * tile::RAYS + half, &tile.hits(simd, mesh, group, half));
+            }
         }
         self.trial.traced_tile(start, taken);
         taken

@@ -1,4 +1,4 @@
-//! Packets: eight rays of a batch, as they come, walk the tree together where any hit will do. A node's children are
+//! Packets: sixteen rays of a batch, as they come, walk the tree together where any hit will do. A node's children are
 //! first compared with the box around the rays' segments, all eight at once, and only then with the rays: short rays
 //! that begin side by side, as those of ambient occlusion, pass by most boxes together. After Wald, Slusallek, Benthin
 //! and Wagner, "Interactive Rendering with Coherent Ray Tracing", Eurographics 2001, and Boulos, Wald and Shirley,
@@ -6,16 +6,22 @@
 //!
 //! A ray meets a child here if and only if it does so alone, to the bit: both planes of an axis are tested with the
 //! bias that they have for the ray's direction, and the lesser is the near one. The box around the segments culls no
-//! child with a hit: with u and R as in [`super::frame`], a segment is cut off where the largest component of its
-//! direction, at least 1, has taken it 2R far, outside the scene; its ends are within 5R of the centre and off by two
-//! roundings, at most 9uR, and by another 5uR where the box is grown. What a triangle is hit at lies within 22uR of the
-//! ray. The box is grown by 64uR.
+//! child and no triangle with a hit: with u and R as in [`super::frame`], a segment is cut off where the largest
+//! component of its direction, at least 1, has taken it 2R far, outside the scene; its ends are within 5R of the centre
+//! and off by two roundings, at most 9uR, and by another 5uR where the box is grown. What a triangle is hit at lies
+//! within 22uR of the ray. From the first origin, corners of triangles are off by another 6uR, and the box's sides by
+//! 6uR. The box is grown by 64uR.
+
+mod leaf;
+mod rays;
 
 use bytemuck::Zeroable;
 
+use self::{leaf::Triangles, rays::Packet};
+
 use super::{
     Tracer,
-    frame::{Domain, Frame},
+    frame::Frame,
     kernel::{self, Entry},
     leaf::{Best, Search},
     probe::Silent,
@@ -25,99 +31,38 @@ use super::{
 };
 use crate::{
     Error, Mesh,
-    accel::structure::{Node, NodeRef, Structure, Target, View},
-    ray::{Hit, MISS, Rays},
+    accel::structure::{NodeRef, Structure, Target, View},
+    ray::{Eight, MISS, Rays},
     simd::Simd,
-    triangle::LANES,
+    triangle::{Block, LANES},
 };
 
-/// Fewer rays than this go on one by one from where they are; 2 and 4 were up to 2% slower.
-const FEW: u32 = 3;
+/// Fewer rays than this go on one by one from where they are. From 2 to 5, times differed by less than the noise.
+const FEW: u32 = 4;
 
-/// 64u, see the module's text.
-const MARGIN: f32 = 64.0 / (1 << 24) as f32;
+/// Fewer rays than this are tested one by one against eight triangles, others all together against one after another.
+/// Packets that never part do not need single rays at all, but to write these only when needed gained nothing.
+const FEWEST: u32 = 3;
+
+/// Rays of a packet.
+const SIZE: usize = 16;
 
 /// A subtree, and which rays are to visit it.
 #[derive(Debug, Clone, Copy)]
-pub struct Visit {
+struct Visit {
     node: NodeRef,
     rays: u32,
 }
 
-/// Eight rays.
-struct Packet<S: Simd> {
-    inverse: [S::F32; 3],
-    /// What is added to `plane * inverse` for lower and for upper planes.
-    bias: [[S::F32; 3]; 2],
-    tmin: S::F32,
-    tmax: S::F32,
-    /// The box around the segments: its lower sides, and its upper ones with their sign changed.
-    sides: [f32; LANES],
+/// What packets remember things in, reused from one to the next.
+pub struct Memory {
+    visits: Vec<Visit>,
+    frames: [[Frame; LANES]; 2],
 }
 
-impl<S: Simd> Packet<S> {
-    #[inline(always)]
-    fn new(simd: S, frames: &Frames<S>, domain: &Domain) -> Self {
-        let zero = simd.splat(0.0);
-        let mut reach = zero;
-        for k in 0..3 {
-            reach = simd.max(simd.abs(frames.local[k]), reach);
-        }
-        let size = simd.add(reach, simd.splat(domain.half_extent));
-        let (most, least) = (simd.add(size, size), simd.sub(zero, simd.add(size, size)));
-        let begin = simd.min(simd.max(frames.tmin, least), most);
-        let end = simd.min(simd.max(frames.tmax, least), most);
-        let margin = simd.mul(size, simd.splat(MARGIN));
-        let mut bias = [[zero; 3]; 2];
-        let mut sides = [zero; LANES];
-        for k in 0..3 {
-            let (near, far) = (frames.near_bias[k], frames.far_bias[k]);
-            bias[0][k] = simd.if_ge(frames.inverse[k], zero, near, far);
-            bias[1][k] = simd.if_ge(frames.inverse[k], zero, far, near);
-            let from = simd.mul_add(frames.direction[k], begin, frames.local[k]);
-            let to = simd.mul_add(frames.direction[k], end, frames.local[k]);
-            sides[k] = simd.sub(simd.min(from, to), margin);
-            sides[3 + k] = simd.sub(zero, simd.add(simd.max(from, to), margin));
-        }
-        let rows = simd.transpose(sides);
-        let mut least = rows[0];
-        for lane in 1..LANES {
-            least = simd.min(rows[lane], least);
-        }
-        Self { inverse: frames.inverse, bias, tmin: frames.tmin, tmax: frames.tmax, sides: simd.store(least) }
-    }
-
-    /// The rays whose interval is not empty.
-    #[inline(always)]
-    fn all(&self, simd: S) -> u32 {
-        simd.le(self.tmin, self.tmax)
-    }
-
-    /// The children whose boxes meet the one around the segments.
-    #[inline(always)]
-    fn near(&self, simd: S, node: &Node) -> u32 {
-        let mut apart = simd.splat(0.0);
-        for k in 0..3 {
-            let (lower, upper) = (simd.load(&node.plane[k]), simd.load(&node.plane[3 + k]));
-            apart = simd.max(simd.add(lower, simd.splat(self.sides[3 + k])), apart);
-            apart = simd.max(simd.sub(simd.splat(self.sides[k]), upper), apart);
-        }
-        simd.le(apart, simd.splat(0.0))
-    }
-
-    /// The rays that meet a child.
-    #[inline(always)]
-    fn meet(&self, simd: S, node: &Node, child: usize) -> u32 {
-        let (mut near, mut far) = (self.tmin, self.tmax);
-        for k in 0..3 {
-            let lower = simd.splat(node.plane[k][child & (LANES - 1)]);
-            let upper = simd.splat(node.plane[3 + k][child & (LANES - 1)]);
-            let lower = simd.mul_add(lower, self.inverse[k], self.bias[0][k]);
-            let upper = simd.mul_add(upper, self.inverse[k], self.bias[1][k]);
-            near = simd.max(simd.min(lower, upper), near);
-            far = simd.min(simd.max(lower, upper), far);
-        }
-        simd.le(near, far)
+impl Default for Memory {
+    fn default() -> Self {
+        Self { visits: Vec::new(), frames: [[Frame::zeroed(); LANES]; 2] }
     }
 }
 
@@ -130,23 +75,27 @@ pub fn each<S: Simd, T: Take + ?Sized, const GRIDS: bool>(
     simd: S,
     tracer: Tracer<'_>,
     rays: &Rays<'_>,
-    (visits, stack): (&mut Vec<Visit>, &mut [Entry]),
+    (memory, stack): (&mut Memory, &mut [Entry]),
     (to, place): (&mut T, usize),
 ) -> Result<(), Error> {
     let Tracer { structure, mesh, .. } = tracer;
     let scene = (structure, structure.view());
-    for first in (0..rays.len()).step_by(LANES) {
-        if first + LANES <= rays.len()
-            && let Some(frames) = Frames::new(simd, &rays.eight(simd, first), &structure.domain)
+    for first in (0..rays.len()).step_by(SIZE) {
+        if first + SIZE <= rays.len()
+            && let Some(frames) = Frames::new(simd.wide(), &rays.sixteen(simd, first), &structure.domain)
         {
-            let hit = trace::<S, GRIDS>(simd, structure, mesh, &frames, visits, stack);
-            for lane in 0..LANES {
-                let primitive = if hit >> lane & 1 == 1 { 0 } else { MISS };
-                to.take(place + first + lane, Hit { primitive, ..Hit::MISS });
+            let origin = rays.get(first).origin.to_array();
+            let hit = trace::<S, GRIDS>(simd, structure, mesh, (&frames, origin), memory, stack);
+            for half in [0, LANES] {
+                let mut hits = Eight::MISSES;
+                for lane in 0..LANES {
+                    hits.primitive[lane] = if hit >> (half + lane) & 1 == 1 { 0 } else { MISS };
+                }
+                to.take_eight(place + first + half, &hits);
             }
             continue;
         }
-        for index in first..rays.len().min(first + LANES) {
+        for index in first..rays.len().min(first + SIZE) {
             let frame = rays.frame(index, &structure.domain)?;
             let hit = kernel::trace::<S, Silent, GRIDS, true>(simd, scene, mesh, &frame, stack, &mut Silent);
             to.take(place + index, hit);
@@ -155,20 +104,23 @@ pub fn each<S: Simd, T: Take + ?Sized, const GRIDS: bool>(
     Ok(())
 }
 
-/// Which of eight rays hit anything.
+/// Which of sixteen rays hit anything.
 #[inline(always)]
 fn trace<S: Simd, const GRIDS: bool>(
     simd: S,
     structure: &Structure,
     mesh: &Mesh,
-    frames: &Frames<S>,
-    visits: &mut Vec<Visit>,
+    (frames, origin): (&Frames<S::Wide>, [f32; 3]),
+    memory: &mut Memory,
     stack: &mut [Entry],
 ) -> u32 {
-    let packet = Packet::new(simd, frames, &structure.domain);
-    let mut rays = [Frame::zeroed(); LANES];
-    frames.store(simd, &mut rays);
-    let all = packet.all(simd);
+    let packet = Packet::new(simd, frames, origin, &structure.domain);
+    let Memory { visits, frames: apart } = memory;
+    let halves = Frames::halves(simd, frames);
+    halves[0].store(simd, &mut apart[0]);
+    halves[1].store(simd, &mut apart[1]);
+    let apart: &[Frame] = apart.as_flattened();
+    let all = packet.all();
     let mut open = all;
     visits.clear();
     visits.push(Visit { node: structure.root, rays: all });
@@ -197,7 +149,7 @@ fn trace<S: Simd, const GRIDS: bool>(
                     while rest != 0 {
                         let child = rest.ilog2() as usize;
                         rest &= !(1 << child);
-                        let rays = going & packet.meet(simd, node, child);
+                        let rays = going & packet.meet(node, child);
                         if rays != 0 {
                             let node = node.child[child & (LANES - 1)];
                             warm(simd, here, node);
@@ -206,13 +158,41 @@ fn trace<S: Simd, const GRIDS: bool>(
                     }
                 }
             }
-            _ => open &= !alone::<S, GRIDS>(simd, structure, mesh, (here, node), (&rays, going), stack),
+            Target::Leaf { block, count } if going.count_ones() >= FEWEST => {
+                open &= !leaf(simd, &packet, apart, going, (&here.blocks[block as usize], count));
+            }
+            _ if going == 0 => {}
+            _ => open &= !alone::<S, GRIDS>(simd, structure, mesh, (here, node), (apart, going), stack),
         }
         if open == 0 {
             break;
         }
     }
     all & !open
+}
+
+/// Which rays hit one of the first `count` triangles of a block.
+#[inline(always)]
+fn leaf<S: Simd>(simd: S, packet: &Packet<S>, apart: &[Frame], going: u32, (block, count): (&Block, u32)) -> u32 {
+    let (triangles, near) = Triangles::new(simd, packet, block);
+    let mut rest = going;
+    let mut near = near & ((1 << count) - 1);
+    while near != 0 {
+        let lane = near.trailing_zeros() as usize;
+        near &= near - 1;
+        let [sure, mut unclear] = triangles.hit(packet, rest, lane);
+        rest &= !sure;
+        while unclear != 0 {
+            let ray = unclear.trailing_zeros();
+            unclear &= unclear - 1;
+            let frame = &apart[ray as usize % SIZE];
+            rest &= !(u32::from(block.intersect(lane, frame).is_some()) << ray);
+        }
+        if rest == 0 {
+            break;
+        }
+    }
+    going & !rest
 }
 
 /// Let rays go on below a node one by one; tells which of them hit anything.
@@ -222,14 +202,14 @@ fn alone<S: Simd, const GRIDS: bool>(
     structure: &Structure,
     mesh: &Mesh,
     (here, node): (View<'_>, NodeRef),
-    (frames, rays): (&[Frame; LANES], u32),
+    (apart, rays): (&[Frame], u32),
     stack: &mut [Entry],
 ) -> u32 {
     let (mut rest, mut hit) = (rays, 0);
     while rest != 0 {
         let lane = rest.trailing_zeros();
         rest &= rest - 1;
-        let (frame, mut silent) = (&frames[lane as usize & (LANES - 1)], Silent);
+        let (frame, mut silent) = (&apart[lane as usize & (SIZE - 1)], Silent);
         let mut search = Search::new(simd, frame, mesh, &mut silent, Best::none(frame.tmax));
         if let Target::Leaf { block, count } = node.target() {
             search.block::<true>(&here.blocks[block as usize], count);

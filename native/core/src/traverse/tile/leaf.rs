@@ -3,7 +3,7 @@
 use super::{ROUNDING, rays::Tile};
 use crate::{
     Mesh,
-    simd::Simd,
+    simd::{Arithmetic, Simd},
     triangle::{Block, LANES},
 };
 
@@ -23,7 +23,7 @@ pub struct Planes {
     blur: [f32; LANES],
 }
 
-type Vector<S> = [<S as Simd>::F32; 3];
+type Vector<S> = [<S as Arithmetic>::F32; 3];
 
 impl Planes {
     /// The planes of a block.
@@ -112,36 +112,36 @@ impl Planes {
         block: &Block,
         lane: usize,
     ) -> bool {
-        let rays = &tile.groups[group];
-        let slope = [simd.load(&rays.slope[0]), simd.load(&rays.slope[1])];
-        let doubt = simd.splat(self.doubt[lane]);
-        let mut least = simd.splat(f32::INFINITY);
+        let (wide, rays) = (simd.wide(), &tile.groups[group]);
+        let slope = [simd.load_wide(&rays.slope[0]), simd.load_wide(&rays.slope[1])];
+        let doubt = wide.splat(self.doubt[lane]);
+        let mut least = wide.splat(f32::INFINITY);
         for edge in &self.edge {
-            least = simd.min(value(simd, edge, lane, slope), least);
+            least = wide.min(value(wide, edge, lane, slope), least);
         }
-        let possible = simd.le(simd.splat(0.0), simd.add(least, doubt));
+        let possible = wide.le(wide.splat(0.0), wide.add(least, doubt));
         if possible == 0 {
             return false;
         }
 
-        let nothing = simd.splat(f32::NAN);
-        let determinant = value(simd, &self.face, lane, slope);
-        let inverse = simd.div(simd.splat(1.0), determinant);
-        let depth = simd.mul(simd.splat(self.volume[lane]), inverse);
-        let error = simd.mul_add(depth, simd.splat(8.0 * ROUNDING), simd.mul(simd.splat(self.blur[lane]), inverse));
-        let error = simd.if_ge(determinant, simd.mul(doubt, simd.splat(1.5)), error, nothing);
-        let (from, to) = (simd.sub(depth, error), simd.add(depth, error));
-        let (near, low) = (simd.load(&rays.near), simd.load(&rays.low));
-        let (high, best) = (simd.load(&rays.high), simd.load(&rays.best));
-        let certain = simd.if_ge(from, near, simd.if_ge(least, doubt, to, nothing), nothing);
-        let accepted = simd.le(certain, low);
-        let beyond = simd.le(high, from) | simd.le(to, near);
+        let nothing = wide.splat(f32::NAN);
+        let determinant = value(wide, &self.face, lane, slope);
+        let inverse = wide.div(wide.splat(1.0), determinant);
+        let depth = wide.mul(wide.splat(self.volume[lane]), inverse);
+        let error = wide.mul_add(depth, wide.splat(8.0 * ROUNDING), wide.mul(wide.splat(self.blur[lane]), inverse));
+        let error = wide.if_ge(determinant, wide.mul(doubt, wide.splat(1.5)), error, nothing);
+        let (from, to) = (wide.sub(depth, error), wide.add(depth, error));
+        let (near, low) = (simd.load_wide(&rays.near), simd.load_wide(&rays.low));
+        let (high, best) = (simd.load_wide(&rays.high), simd.load_wide(&rays.best));
+        let certain = wide.if_ge(from, near, wide.if_ge(least, doubt, to, nothing), nothing);
+        let accepted = wide.le(certain, low);
+        let beyond = wide.le(high, from) | wide.le(to, near);
         let winner = f32::from_bits(block.primitive[lane]);
         if accepted != 0 {
             let rays = &mut tile.groups[group];
-            rays.low = simd.store(simd.if_ge(low, certain, from, low));
-            rays.high = simd.store(simd.if_ge(low, certain, to, high));
-            rays.best = simd.store(simd.if_ge(low, certain, simd.splat(winner), best));
+            rays.low = simd.store_wide(wide.if_ge(low, certain, from, low));
+            rays.high = simd.store_wide(wide.if_ge(low, certain, to, high));
+            rays.best = simd.store_wide(wide.if_ge(low, certain, wide.splat(winner), best));
         }
         let unclear = possible & !accepted & !beyond;
         let decided = unclear != 0 && tile.decide(simd, mesh, group, unclear, block, lane);
@@ -195,9 +195,9 @@ fn store<S: Simd>(simd: S, v: Vector<S>, to: &mut [[f32; LANES]; 3]) {
     *to = [simd.store(v[0]), simd.store(v[1]), simd.store(v[2])];
 }
 
-/// The product of a normal and eight directions.
+/// The product of a normal and some directions.
 #[inline(always)]
-fn value<S: Simd>(simd: S, normal: &[[f32; LANES]; 3], lane: usize, slope: [S::F32; 2]) -> S::F32 {
+fn value<S: Arithmetic>(simd: S, normal: &[[f32; LANES]; 3], lane: usize, slope: [S::F32; 2]) -> S::F32 {
     let [x, y, z] = [simd.splat(normal[0][lane]), simd.splat(normal[1][lane]), simd.splat(normal[2][lane])];
     simd.mul_add(x, slope[0], simd.mul_add(y, slope[1], z))
 }

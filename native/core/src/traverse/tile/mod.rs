@@ -1,5 +1,5 @@
 //! Tiles: up to 256 rays of one origin walk the tree together as a bundle. Boxes and triangles are projected from the
-//! origin once for all of them: a box becomes a rectangle of slopes, to be compared with those of groups of eight rays,
+//! origin once for all of them: a box becomes a rectangle of slopes, to be compared with those of groups of sixteen rays,
 //! and a triangle three planes through the origin, so that each of its edge functions is two multiply-adds a ray.
 //! After Wald, Slusallek, Benthin and Wagner, "Interactive Rendering with Coherent Ray Tracing", Eurographics 2001, and
 //! Reshetov, Soupikov and Hurley, "Multi-Level Ray Tracing Algorithm", SIGGRAPH 2005.
@@ -39,7 +39,7 @@ use self::{
     frustum::{Boxes, Projector},
     leaf::Planes,
 };
-use super::{kernel::Entry, stream};
+use super::{frame::ROUNDING, kernel::Entry, stream};
 use crate::{
     Mesh,
     accel::structure::{NodeRef, Structure, Target},
@@ -49,8 +49,11 @@ use crate::{
 
 pub use self::rays::Tile;
 
+/// Rays of a group.
+pub const RAYS: usize = 16;
+
 /// Groups of rays in a tile. In a prototype tiles of 16 and of 64 rays were slower than those of 256.
-const GROUPS: usize = 32;
+const GROUPS: usize = 16;
 
 /// Groups whose slopes are compared with a box at once.
 const BLOCKS: usize = GROUPS / LANES;
@@ -58,9 +61,6 @@ const BLOCKS: usize = GROUPS / LANES;
 /// Tiles are used where half the scene's longest edge is in this range: outside, products of three lengths may leave
 /// the range of single precision.
 pub const EXTENTS: std::ops::RangeInclusive<f32> = 1e-9..=1e9;
-
-/// Half a unit in the last place of single precision.
-const ROUNDING: f32 = 1.0 / (1 << 24) as f32;
 
 /// See the module's text.
 #[derive(Debug, Clone, Copy, Default)]

@@ -3,47 +3,47 @@
 use bytemuck::Zeroable;
 use glam::Vec3;
 
-use super::{BLOCKS, EXTENTS, GROUPS, Slack, Visit};
+use super::{BLOCKS, EXTENTS, GROUPS, RAYS, Slack, Visit};
 use crate::{
     accel::structure::NodeRef,
     ray::{MISS, Rays},
-    simd::Simd,
+    simd::{Arithmetic, Simd},
     traverse::frame::{self, Domain, Frame, NEAR},
     triangle::LANES,
 };
 
 /// The least groups worth a tile.
-const FEWEST: usize = 4;
+const FEWEST: usize = 2;
 
 /// A ray is never this much steeper along another axis than along the tile's: its slopes are at most 2.
 const SLANT: f32 = 0.5;
 
-/// Eight rays, as boxes and triangles meet them. Depths are along the tile's axis, from the origin.
+/// Sixteen rays, as boxes and triangles meet them. Depths are along the tile's axis, from the origin.
 #[derive(Debug, Clone, Copy, Zeroable)]
 #[repr(C, align(64))]
 pub struct Group {
     /// Direction over its component along the axis.
-    pub slope: [[f32; LANES]; 2],
+    pub slope: [[f32; RAYS]; 2],
     /// Hits before this depth do not count.
-    pub near: [f32; LANES],
+    pub near: [f32; RAYS],
     /// Hits up to this depth are certainly before the best one, or the end of the interval.
-    pub low: [f32; LANES],
+    pub low: [f32; RAYS],
     /// Hits from this depth on are certainly behind the best one, or the end of the interval.
-    pub high: [f32; LANES],
+    pub high: [f32; RAYS],
     /// The triangle of the best hit, or [`MISS`], as bits that no vector operation changes.
-    pub best: [f32; LANES],
+    pub best: [f32; RAYS],
 }
 
-/// Eight rays, as the exact test needs them.
+/// Sixteen rays, as the exact test needs them.
 #[derive(Debug, Clone, Copy, Zeroable)]
 #[repr(C, align(64))]
 pub struct Exactly {
     /// See [`Frame::direction`].
-    pub direction: [[f32; LANES]; 3],
+    pub direction: [[f32; RAYS]; 3],
     /// See [`Frame::tmin`] and [`Frame::tmax`].
-    pub interval: [[f32; LANES]; 2],
+    pub interval: [[f32; RAYS]; 2],
     /// From the frame's units to the ray's.
-    pub scale: [f32; LANES],
+    pub scale: [f32; RAYS],
 }
 
 /// In row `i` lane `i` is set.
@@ -146,11 +146,11 @@ impl Tile {
     /// Take rays from `first` on, as far as they fit together, and say how many; none where a tile is not worth it.
     #[inline(always)]
     pub fn gather<S: Simd>(&mut self, simd: S, rays: &Rays<'_>, first: usize, domain: &Domain) -> usize {
-        let most = ((rays.len() - first) / LANES).min(GROUPS);
+        let most = ((rays.len() - first) / RAYS).min(GROUPS);
         if most < FEWEST || !self.begin(rays, first, domain) {
             return 0;
         }
-        while self.count < most && self.add(simd, rays, first + self.count * LANES) {
+        while self.count < most && self.add(simd, rays, first + self.count * RAYS) {
             self.count += 1;
         }
         if self.count < FEWEST {
@@ -158,7 +158,7 @@ impl Tile {
         }
         self.slack = if self.slanted == 0 { Slack::STEEP } else { Slack::SLANTED };
         self.span(simd);
-        self.count * LANES
+        self.count * RAYS
     }
 
     /// An empty tile around the first ray; false where its origin is no tile's.
@@ -189,51 +189,52 @@ impl Tile {
     /// Add a group; false where it does not fit.
     #[inline(always)]
     fn add<S: Simd>(&mut self, simd: S, rays: &Rays<'_>, first: usize) -> bool {
-        let columns = rays.eight(simd, first);
-        let zero = simd.splat(0.0);
+        let columns = rays.sixteen(simd, first);
+        let wide = simd.wide();
+        let zero = wide.splat(0.0);
         let (mut elsewhere, mut largest, mut direction) = (zero, zero, [zero; 3]);
         for k in 0..3 {
-            let offset = simd.sub(columns[k], simd.splat(self.origin[k]));
+            let offset = wide.sub(columns[k], wide.splat(self.origin[k]));
             direction[k] = columns[3 + k];
-            elsewhere = simd.max(simd.abs(offset), elsewhere);
-            elsewhere = simd.add(elsewhere, simd.mul(direction[k], zero));
-            largest = simd.max(simd.abs(direction[k]), largest);
+            elsewhere = wide.max(wide.abs(offset), elsewhere);
+            elsewhere = wide.add(elsewhere, wide.mul(direction[k], zero));
+            largest = wide.max(wide.abs(direction[k]), largest);
         }
         let [x, y, z] = self.axes;
         let [x, y, z] = [direction[x], direction[y], direction[z]];
         let (tmin, tmax) = (columns[6], columns[7]);
-        let rise = simd.mul(z, simd.splat(self.sign));
-        let fits = simd.le(elsewhere, zero)
-            & simd.le(simd.splat(1e-37), largest)
-            & simd.le(largest, simd.splat(1e38))
-            & simd.le(simd.mul(largest, simd.splat(SLANT)), rise)
-            & simd.le(zero, tmin)
-            & (simd.le(tmin, tmax) | simd.le(tmax, tmin));
-        if fits != 0xff {
+        let rise = wide.mul(z, wide.splat(self.sign));
+        let fits = wide.le(elsewhere, zero)
+            & wide.le(wide.splat(1e-37), largest)
+            & wide.le(largest, wide.splat(1e38))
+            & wide.le(wide.mul(largest, wide.splat(SLANT)), rise)
+            & wide.le(zero, tmin)
+            & (wide.le(tmin, tmax) | wide.le(tmax, tmin));
+        if fits != S::Wide::ALL {
             return false;
         }
-        let steeper = simd.le(rise, simd.max(simd.abs(x), simd.abs(y)));
+        let steeper = wide.le(rise, wide.max(wide.abs(x), wide.abs(y)));
         self.slanted |= u32::from(steeper != 0) << self.count;
 
-        let length = simd.and(largest, simd.splat(f32::INFINITY));
-        let scale = simd.sub_bits(simd.splat(f32::from_bits(254 << 23)), length);
-        let (tmin, tmax) = (simd.mul(tmin, length), simd.mul(tmax, length));
+        let length = wide.and(largest, wide.splat(f32::INFINITY));
+        let scale = wide.sub_bits(wide.splat(f32::from_bits(254 << 23)), length);
+        let (tmin, tmax) = (wide.mul(tmin, length), wide.mul(tmax, length));
         let exactly = &mut self.exactly[self.count];
         for k in 0..3 {
-            exactly.direction[k] = simd.store(simd.mul(direction[k], scale));
+            exactly.direction[k] = simd.store_wide(wide.mul(direction[k], scale));
         }
-        exactly.interval = [simd.store(tmin), simd.store(tmax)];
-        exactly.scale = simd.store(scale);
+        exactly.interval = [simd.store_wide(tmin), simd.store_wide(tmax)];
+        exactly.scale = simd.store_wide(scale);
 
-        let rise = simd.mul(rise, scale);
-        let inverse = simd.div(simd.splat(1.0), simd.mul(z, scale));
+        let rise = wide.mul(rise, scale);
+        let inverse = wide.div(wide.splat(1.0), wide.mul(z, scale));
         let group = &mut self.groups[self.count];
-        group.slope[0] = simd.store(simd.mul(simd.mul(x, scale), inverse));
-        group.slope[1] = simd.store(simd.mul(simd.mul(y, scale), inverse));
-        group.near = simd.store(simd.mul(tmin, rise));
-        group.low = simd.store(simd.mul(tmax, rise));
+        group.slope[0] = simd.store_wide(wide.mul(wide.mul(x, scale), inverse));
+        group.slope[1] = simd.store_wide(wide.mul(wide.mul(y, scale), inverse));
+        group.near = simd.store_wide(wide.mul(tmin, rise));
+        group.low = simd.store_wide(wide.mul(tmax, rise));
         group.high = group.low;
-        group.best = simd.store(simd.splat(f32::from_bits(MISS)));
+        group.best = simd.store_wide(wide.splat(f32::from_bits(MISS)));
         true
     }
 
@@ -247,11 +248,15 @@ impl Tile {
             let groups = &self.groups[first..self.count.min(first + LANES)];
             for k in 0..2 {
                 // Groups missing from the last block repeat its first one.
-                let mut rows = [simd.load(&groups[0].slope[k]); LANES];
+                let mut rows = [extremes(simd, &groups[0].slope[k]); LANES];
                 for (row, group) in rows.iter_mut().zip(groups) {
-                    *row = simd.load(&group.slope[k]);
+                    *row = extremes(simd, &group.slope[k]);
                 }
-                let [low, high] = extremes(simd, simd.transpose(rows));
+                let [mut least, mut greatest] = [[simd.splat(0.0); LANES]; 2];
+                for (group, [low, high]) in rows.into_iter().enumerate() {
+                    (least[group], greatest[group]) = (low, high);
+                }
+                let (low, high) = (least_of(simd, least), greatest_of(simd, greatest));
                 all_low[k] = simd.min(low, all_low[k]);
                 all_high[k] = simd.max(high, all_high[k]);
                 // A half that reaches both ends however the middle was rounded.
@@ -262,10 +267,9 @@ impl Tile {
             }
             let mut rows = [simd.splat(f32::NEG_INFINITY); LANES];
             for (row, group) in rows.iter_mut().zip(groups) {
-                *row = simd.load(&group.high);
+                [_, *row] = extremes(simd, &group.high);
             }
-            let [_, far] = extremes(simd, simd.transpose(rows));
-            spans.far = simd.store(far);
+            spans.far = simd.store(greatest_of(simd, rows));
         }
         for k in 0..2 {
             self.low[k] = -greatest(&simd.store(simd.sub(simd.splat(0.0), all_low[k])));
@@ -276,7 +280,7 @@ impl Tile {
 
     /// A visit for all groups, whatever they meet.
     pub fn everything(&self, node: NodeRef) -> Visit {
-        let groups = u32::MAX >> (GROUPS - self.count);
+        let groups = (1 << self.count) - 1;
         let (low, high) = ([f32::NEG_INFINITY; 2], [f32::INFINITY; 2]);
         Visit { node, groups, near: f32::NEG_INFINITY, low, high }
     }
@@ -308,7 +312,7 @@ impl Tile {
     /// written at once: a vector could not be read soon after one of them was.
     #[inline(always)]
     pub fn approach<S: Simd>(&mut self, simd: S, group: usize) {
-        let (this, others) = (simd.splat(greatest(&self.groups[group].high)), simd.splat(f32::INFINITY));
+        let (this, others) = (simd.splat(greatest_of_all(simd, &self.groups[group].high)), simd.splat(f32::INFINITY));
         let limit = simd.if_ge(simd.load(&IDENTITY[group % LANES]), simd.splat(1.0), this, others);
         let far = &mut self.spans[group / LANES].far;
         *far = simd.store(simd.min(limit, simd.load(far)));
@@ -337,15 +341,40 @@ impl Tile {
     }
 }
 
-/// The least and the greatest of each lane.
+/// The lesser and the greater of each of eight numbers and that eight places on.
 #[inline(always)]
-fn extremes<S: Simd>(simd: S, rows: [S::F32; LANES]) -> [S::F32; 2] {
-    let (mut low, mut high) = (rows[0], rows[0]);
-    for row in &rows[1..] {
-        low = simd.min(*row, low);
-        high = simd.max(*row, high);
+fn extremes<S: Simd>(simd: S, numbers: &[f32; RAYS]) -> [S::F32; 2] {
+    let [low, high] = simd.halves(simd.load_wide(numbers));
+    [simd.min(low, high), simd.max(low, high)]
+}
+
+/// The least of each row.
+#[inline(always)]
+fn least_of<S: Simd>(simd: S, rows: [S::F32; LANES]) -> S::F32 {
+    let columns = simd.transpose(rows);
+    let mut least = columns[0];
+    for column in &columns[1..] {
+        least = simd.min(*column, least);
     }
-    [low, high]
+    least
+}
+
+/// The greatest of each row.
+#[inline(always)]
+fn greatest_of<S: Simd>(simd: S, rows: [S::F32; LANES]) -> S::F32 {
+    let columns = simd.transpose(rows);
+    let mut greatest = columns[0];
+    for column in &columns[1..] {
+        greatest = simd.max(*column, greatest);
+    }
+    greatest
+}
+
+/// The greatest of sixteen numbers.
+#[inline(always)]
+fn greatest_of_all<S: Simd>(simd: S, numbers: &[f32; RAYS]) -> f32 {
+    let [_, greater] = extremes(simd, numbers);
+    greatest(&simd.store(greater))
 }
 
 /// The greatest of eight numbers.

@@ -1,7 +1,7 @@
 //! Where a tile asks the exact test: for rays of which the planes decide nothing, below nodes that rays visit one by
 //! one, and for the parameters and weights of all winners.
 
-use super::{GROUPS, ROUNDING, rays::Tile};
+use super::{GROUPS, RAYS, ROUNDING, rays::Tile};
 use crate::{
     Mesh,
     accel::structure::{NodeRef, Structure, View},
@@ -36,33 +36,41 @@ impl Tile {
         if self.slanted >> group & 1 == 1 {
             return self.decide_one_by_one(mesh, group, lanes, block, triangle);
         }
-        let exact = self.exact(simd, group, &self.repeated(simd, block.corners(triangle).each_ref()));
-        let t = simd.store(exact.t);
-        let [tmin, tmax] = self.exactly[group].interval;
-        let (hit, unclear) = (lanes & exact.hit, lanes & exact.unclear);
-        let mut nearer = false;
-        for lane in (0..LANES).filter(|lane| hit >> lane & 1 == 1) {
-            let hit = Hit { t: t[lane], primitive: block.primitive[triangle], ..Hit::MISS };
-            if tmin[lane] <= hit.t && hit.t <= tmax[lane] {
-                nearer |= self.offer(mesh, group, lane, hit);
+        let corners = self.repeated(simd, block.corners(triangle).each_ref());
+        let (mut nearer, mut unclear) = (false, 0);
+        for first in [0, LANES] {
+            let lanes = lanes >> first & 0xff;
+            if lanes == 0 {
+                continue;
+            }
+            let exact = self.exact(simd, group, first, &corners);
+            let t = simd.store(exact.t);
+            unclear |= (lanes & exact.unclear) << first;
+            for lane in (0..LANES).filter(|lane| (lanes & exact.hit) >> lane & 1 == 1) {
+                let hit = Hit { t: t[lane], primitive: block.primitive[triangle], ..Hit::MISS };
+                let [tmin, tmax] = self.exactly[group].interval;
+                if tmin[first + lane] <= hit.t && hit.t <= tmax[first + lane] {
+                    nearer |= self.offer(mesh, group, first + lane, hit);
+                }
             }
         }
         nearer | (unclear != 0 && self.decide_one_by_one(mesh, group, unclear, block, triangle))
     }
 
-    /// The exact test of the rays of a group that is not slanted.
+    /// The exact test of eight rays, from `first` on, of a group that is not slanted.
     #[inline(always)]
-    fn exact<S: Simd>(&self, simd: S, group: usize, corners: &[[S::F32; 3]; 3]) -> Exact<S> {
-        let slope = &self.groups[group].slope;
-        let depth = simd.load(&self.exactly[group].direction[self.axes[2]]);
-        Exact::new(simd, corners, [simd.load(&slope[0]), simd.load(&slope[1])], depth)
+    fn exact<S: Simd>(&self, simd: S, group: usize, first: usize, corners: &[[S::F32; 3]; 3]) -> Exact<S> {
+        let [x, y] = &self.groups[group].slope;
+        let depth = &self.exactly[group].direction[self.axes[2]];
+        let shear = [simd.load(eight(x, first)), simd.load(eight(y, first))];
+        Exact::new(simd, corners, shear, simd.load(eight(depth, first)))
     }
 
     #[cold]
     #[inline(never)]
     fn decide_one_by_one(&mut self, mesh: &Mesh, group: usize, lanes: u32, block: &Block, triangle: usize) -> bool {
         let mut nearer = false;
-        for lane in (0..LANES).filter(|lane| lanes >> lane & 1 == 1) {
+        for lane in (0..RAYS).filter(|lane| lanes >> lane & 1 == 1) {
             if let Some(hit) = block.intersect(triangle, &self.frame(group, lane)) {
                 nearer |= self.offer(mesh, group, lane, hit);
             }
@@ -117,7 +125,7 @@ impl Tile {
         stack: &mut [Entry],
     ) {
         for group in (0..GROUPS).filter(|group| groups >> group & 1 == 1) {
-            for lane in 0..LANES {
+            for lane in 0..RAYS {
                 let frame = self.frame(group, lane);
                 let before = self.as_searched(group, lane, &frame);
                 let mut silent = Silent;
@@ -145,26 +153,26 @@ impl Tile {
         Best { low, high, primitive }
     }
 
-    /// The best hits of a group, in the rays' own units.
+    /// The best hits of eight rays of a group, from `first` on, in the rays' own units.
     #[inline(always)]
-    pub fn hits<S: Simd>(&self, simd: S, mesh: &Mesh, group: usize) -> Eight {
+    pub fn hits<S: Simd>(&self, simd: S, mesh: &Mesh, group: usize, first: usize) -> Eight {
         // Of all these bits, those of MISS alone are not a number.
-        let best = simd.load(&self.groups[group].best);
+        let best = simd.load(eight(&self.groups[group].best, first));
         let met = simd.le(best, best);
         let mut hits = Eight::MISSES;
         if met != 0 && self.slanted >> group & 1 == 1 {
-            self.set_one_by_one(mesh, group, &mut hits);
+            self.set_one_by_one(mesh, group, first, &mut hits);
         } else if met != 0 {
-            self.set_together(simd, mesh, group, met, &mut hits);
+            self.set_together(simd, mesh, (group, first), met, &mut hits);
         }
         hits
     }
 
     #[inline(never)]
-    fn set_one_by_one(&self, mesh: &Mesh, group: usize, hits: &mut Eight) {
+    fn set_one_by_one(&self, mesh: &Mesh, group: usize, first: usize, hits: &mut Eight) {
         for lane in 0..LANES {
-            let frame = self.frame(group, lane);
-            let hit = self.best(mesh, group, lane, &frame);
+            let frame = self.frame(group, first + lane);
+            let hit = self.best(mesh, group, first + lane, &frame);
             if hit.primitive != MISS {
                 hits.set(lane, Hit { t: frame.parameter(hit.t), ..hit });
             }
@@ -172,8 +180,8 @@ impl Tile {
     }
 
     #[inline(always)]
-    fn set_together<S: Simd>(&self, simd: S, mesh: &Mesh, group: usize, met: u32, hits: &mut Eight) {
-        let bits = &self.groups[group].best;
+    fn set_together<S: Simd>(&self, simd: S, mesh: &Mesh, (group, start): (usize, usize), met: u32, hits: &mut Eight) {
+        let bits = eight(&self.groups[group].best, start);
         let any = bits[met.trailing_zeros() as usize % LANES];
         let (best, first, zero) = (simd.load(bits), simd.splat(any), simd.splat(0.0));
         let triangles: [u32; LANES] = bytemuck::cast(simd.store(simd.if_ge(best, zero, best, first)));
@@ -188,8 +196,8 @@ impl Tile {
         } else {
             self.gathered(simd, mesh, &triangles)
         };
-        let exact = self.exact(simd, group, &corners);
-        let t = simd.mul(exact.t, simd.load(&self.exactly[group].scale));
+        let exact = self.exact(simd, group, start, &corners);
+        let t = simd.mul(exact.t, simd.load(eight(&self.exactly[group].scale, start)));
         hits.primitive = bytemuck::cast(*bits);
         hits.t = simd.store(simd.if_ge(best, zero, t, simd.splat(f32::INFINITY)));
         hits.u = simd.store(simd.if_ge(best, zero, exact.u, zero));
@@ -229,4 +237,10 @@ impl Tile {
         }
         relative
     }
+}
+
+/// Eight of a group's numbers, from `first` on.
+#[inline(always)]
+fn eight(numbers: &[f32; RAYS], first: usize) -> &[f32; LANES] {
+    &bytemuck::cast_ref::<_, [[f32; LANES]; 2]>(numbers)[first / LANES]
 }
