@@ -18,10 +18,9 @@ mod rays;
 use bytemuck::Zeroable;
 
 use self::{leaf::Triangles, rays::Packet};
-
 use super::{
     Tracer,
-    frame::Frame,
+    frame::{Domain, Frame},
     kernel::{self, Entry},
     leaf::{Best, Search},
     probe::Silent,
@@ -41,7 +40,6 @@ use crate::{
 const FEW: u32 = 4;
 
 /// Fewer rays than this are tested one by one against eight triangles, others all together against one after another.
-/// Packets that never part do not need single rays at all, but to write these only when needed gained nothing.
 const FEWEST: u32 = 3;
 
 /// Rays of a packet.
@@ -84,8 +82,7 @@ pub fn each<S: Simd, T: Take + ?Sized, const GRIDS: bool>(
         if first + SIZE <= rays.len()
             && let Some(frames) = Frames::new(simd.wide(), &rays.sixteen(simd, first), &structure.domain)
         {
-            let origin = rays.get(first).origin.to_array();
-            let hit = trace::<S, GRIDS>(simd, structure, mesh, (&frames, origin), memory, stack);
+            let hit = trace::<S, GRIDS>(simd, structure, mesh, (&frames, rays.part(first, SIZE)), memory, stack);
             for half in [0, LANES] {
                 let mut hits = Eight::MISSES;
                 for lane in 0..LANES {
@@ -110,16 +107,13 @@ fn trace<S: Simd, const GRIDS: bool>(
     simd: S,
     structure: &Structure,
     mesh: &Mesh,
-    (frames, origin): (&Frames<S::Wide>, [f32; 3]),
+    (frames, rays): (&Frames<S::Wide>, Rays<'_>),
     memory: &mut Memory,
     stack: &mut [Entry],
 ) -> u32 {
-    let packet = Packet::new(simd, frames, origin, &structure.domain);
+    let packet = Packet::new(simd, frames, rays.get(0).origin.to_array(), &structure.domain);
     let Memory { visits, frames: apart } = memory;
-    let halves = Frames::halves(simd, frames);
-    halves[0].store(simd, &mut apart[0]);
-    halves[1].store(simd, &mut apart[1]);
-    let apart: &[Frame] = apart.as_flattened();
+    let mut are_written = false;
     let all = packet.all();
     let mut open = all;
     visits.clear();
@@ -159,10 +153,19 @@ fn trace<S: Simd, const GRIDS: bool>(
                 }
             }
             Target::Leaf { block, count } if going.count_ones() >= FEWEST => {
-                open &= !leaf(simd, &packet, apart, going, (&here.blocks[block as usize], count));
+                let leaf = Leaf { block: &here.blocks[block as usize], count, rays: &rays, domain: &structure.domain };
+                open &= !leaf.hit(simd, &packet, going);
             }
             _ if going == 0 => {}
-            _ => open &= !alone::<S, GRIDS>(simd, structure, mesh, (here, node), (apart, going), stack),
+            _ => {
+                if !are_written {
+                    let halves = Frames::halves(simd, frames);
+                    halves[0].store(simd, &mut apart[0]);
+                    halves[1].store(simd, &mut apart[1]);
+                    are_written = true;
+                }
+                open &= !alone::<S, GRIDS>(simd, structure, mesh, (here, node), (apart.as_flattened(), going), stack);
+            }
         }
         if open == 0 {
             break;
@@ -171,28 +174,45 @@ fn trace<S: Simd, const GRIDS: bool>(
     all & !open
 }
 
-/// Which rays hit one of the first `count` triangles of a block.
-#[inline(always)]
-fn leaf<S: Simd>(simd: S, packet: &Packet<S>, apart: &[Frame], going: u32, (block, count): (&Block, u32)) -> u32 {
-    let (triangles, near) = Triangles::new(simd, packet, block);
-    let mut rest = going;
-    let mut near = near & ((1 << count) - 1);
-    while near != 0 {
-        let lane = near.trailing_zeros() as usize;
-        near &= near - 1;
-        let [sure, mut unclear] = triangles.hit(packet, rest, lane);
-        rest &= !sure;
-        while unclear != 0 {
-            let ray = unclear.trailing_zeros();
-            unclear &= unclear - 1;
-            let frame = &apart[ray as usize % SIZE];
-            rest &= !(u32::from(block.intersect(lane, frame).is_some()) << ray);
+/// A block of triangles to be tested against the rays of a packet.
+struct Leaf<'a> {
+    block: &'a Block,
+    /// Triangles in it.
+    count: u32,
+    rays: &'a Rays<'a>,
+    domain: &'a Domain,
+}
+
+impl Leaf<'_> {
+    /// Which of the rays `going` hit one of the triangles.
+    #[inline(always)]
+    fn hit<S: Simd>(&self, simd: S, packet: &Packet<S>, going: u32) -> u32 {
+        let (triangles, near) = Triangles::new(simd, packet, self.block);
+        let mut rest = going;
+        let mut near = near & ((1 << self.count) - 1);
+        while near != 0 {
+            let lane = near.trailing_zeros() as usize;
+            near &= near - 1;
+            let [sure, mut unclear] = triangles.hit(packet, rest, lane);
+            rest &= !sure;
+            while unclear != 0 {
+                let ray = unclear.trailing_zeros();
+                unclear &= unclear - 1;
+                rest &= !(u32::from(self.is_hit(lane, ray as usize)) << ray);
+            }
+            if rest == 0 {
+                break;
+            }
         }
-        if rest == 0 {
-            break;
-        }
+        going & !rest
     }
-    going & !rest
+
+    /// What the exact test says of a triangle and a ray.
+    #[cold]
+    #[inline(never)]
+    fn is_hit(&self, lane: usize, ray: usize) -> bool {
+        self.rays.frame(ray, self.domain).is_ok_and(|frame| self.block.intersect(lane, &frame).is_some())
+    }
 }
 
 /// Let rays go on below a node one by one; tells which of them hit anything.

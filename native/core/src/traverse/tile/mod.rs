@@ -109,7 +109,10 @@ pub fn trace<S: Simd, const GRIDS: bool>(
             (here, floor) = (structure.view(), 0);
         }
         let Some(visit) = visits.pop() else { return };
-        let groups = tile.meeting(simd, &visit);
+        let mut groups = tile.meeting(simd, &visit);
+        if tile.may_miss(&visit) {
+            groups = tile.holding(simd, &visit, groups);
+        }
         if groups == 0 {
             continue;
         }

@@ -18,6 +18,9 @@ const FEWEST: usize = 2;
 /// A ray is never this much steeper along another axis than along the tile's: its slopes are at most 2.
 const SLANT: f32 = 0.5;
 
+/// Rays along the side of a square of them.
+const SIDE: f32 = 16.0;
+
 /// Sixteen rays, as boxes and triangles meet them. Depths are along the tile's axis, from the origin.
 #[derive(Debug, Clone, Copy, Zeroable)]
 #[repr(C, align(64))]
@@ -107,6 +110,8 @@ pub struct Tile {
     pub low: [f32; 2],
     /// Greatest slopes.
     pub high: [f32; 2],
+    /// How far rays are from their neighbours where they make a square.
+    step: [f32; 2],
     /// The farthest best hit.
     pub far: f32,
     /// The rays.
@@ -133,6 +138,7 @@ impl Default for Tile {
             slack: Slack::STEEP,
             low: [0.0; 2],
             high: [0.0; 2],
+            step: [0.0; 2],
             far: 0.0,
             groups: [Group::zeroed(); GROUPS],
             exactly: [Exactly::zeroed(); GROUPS],
@@ -275,6 +281,7 @@ impl Tile {
             self.low[k] = -greatest(&simd.store(simd.sub(simd.splat(0.0), all_low[k])));
             self.high[k] = greatest(&simd.store(all_high[k]));
         }
+        self.step = [(self.high[0] - self.low[0]) / SIDE, (self.high[1] - self.low[1]) / SIDE];
         self.update_far(simd);
     }
 
@@ -306,6 +313,31 @@ impl Tile {
             groups |= simd.le(apart, simd.splat(0.0)) << (block * LANES);
         }
         groups & visit.groups
+    }
+
+    /// Whether a visit's rectangle is so narrow that it may be between all rays.
+    #[inline(always)]
+    pub fn may_miss(&self, visit: &Visit) -> bool {
+        let [x, y] = [visit.high[0] - visit.low[0], visit.high[1] - visit.low[1]];
+        (x < self.step[0]) | (y < self.step[1])
+    }
+
+    /// Those of some groups that have a ray with slopes in a visit's rectangle.
+    #[inline(always)]
+    pub fn holding<S: Simd>(&self, simd: S, visit: &Visit, groups: u32) -> u32 {
+        let wide = simd.wide();
+        let (mut rest, mut holding) = (groups, groups);
+        while rest != 0 {
+            let group = rest.trailing_zeros() as usize % GROUPS;
+            rest &= rest - 1;
+            let mut inside = S::Wide::ALL;
+            for k in 0..2 {
+                let slope = simd.load_wide(&self.groups[group].slope[k]);
+                inside &= wide.le(wide.splat(visit.low[k]), slope) & wide.le(slope, wide.splat(visit.high[k]));
+            }
+            holding &= !(u32::from(inside == 0) << group);
+        }
+        holding
     }
 
     /// Note that the farthest hit of a group has come nearer; [`Tile::update_far`] is to follow. All eight numbers are
