@@ -8,20 +8,6 @@ use espalier_core::{Accelerator, Config, Hits, Job, Mesh, Method, ray::MISS, sim
 use glam::Vec3;
 use std::sync::Arc;
 
-/// Numbers in -1..1, the same every time.
-struct Numbers(u64);
-
-impl Numbers {
-    fn next(&mut self) -> f32 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 40) as f32 / (1 << 23) as f32 - 1.0
-    }
-
-    fn point(&mut self) -> Vec3 {
-        Vec3::new(self.next(), self.next(), self.next())
-    }
-}
-
 /// A strip of neighbours in a plane that is askew or not, then triangles of every shape.
 fn mesh(numbers: &mut Numbers, centre: Vec3, scale: f32) -> Arc<Mesh> {
     let mut vertices = Vec::new();

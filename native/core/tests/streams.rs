@@ -7,20 +7,6 @@ use espalier_core::{Accelerator, Config, Job, Mesh, Method, simd::Level};
 use glam::Vec3;
 use std::sync::Arc;
 
-/// Numbers in -1..1, the same every time.
-struct Numbers(u64);
-
-impl Numbers {
-    fn next(&mut self) -> f32 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 40) as f32 / (1 << 23) as f32 - 1.0
-    }
-
-    fn point(&mut self) -> Vec3 {
-        Vec3::new(self.next(), self.next(), self.next())
-    }
-}
-
 fn soup(numbers: &mut Numbers, count: u32, size: f32) -> Arc<Mesh> {
     let corners = (0..count).flat_map(|_| {
         let centre = numbers.point();

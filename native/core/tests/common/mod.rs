@@ -19,6 +19,20 @@ use espalier_core::{
 };
 use glam::Vec3;
 
+/// Numbers in -1..1, the same every time.
+pub struct Numbers(pub u64);
+
+impl Numbers {
+    pub fn next(&mut self) -> f32 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 40) as f32 / (1 << 23) as f32 - 1.0
+    }
+
+    pub fn point(&mut self) -> Vec3 {
+        Vec3::new(self.next(), self.next(), self.next())
+    }
+}
+
 /// Rays by column.
 #[derive(Debug, Default, Clone)]
 pub struct RayBatch {

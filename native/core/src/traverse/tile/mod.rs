@@ -34,6 +34,7 @@ mod frustum;
 mod leaf;
 mod rays;
 mod resolve;
+mod spans;
 
 use self::{
     frustum::{Boxes, Projector},
