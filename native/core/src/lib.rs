@@ -6,6 +6,7 @@
 pub mod accel;
 pub mod arena;
 pub mod bounds;
+mod cache;
 pub mod error;
 pub mod job;
 pub mod mesh;

@@ -64,7 +64,7 @@ impl Block {
         for k in 0..3 {
             let axis = frame.axes[k] as usize;
             for c in 0..3 {
-                relative[c][k] = self.corner[c][axis][lane] - frame.origin[axis];
+                relative[c][k] = self.corner[c][axis][lane] - frame.origin[k];
             }
         }
         relative
@@ -101,7 +101,7 @@ pub fn relative(frame: &Frame, corners: [&[f32; 3]; 3]) -> [[f32; 3]; 3] {
     for k in 0..3 {
         let axis = frame.axes[k] as usize;
         for c in 0..3 {
-            relative[c][k] = corners[c][axis] - frame.origin[axis];
+            relative[c][k] = corners[c][axis] - frame.origin[k];
         }
     }
     relative
@@ -119,7 +119,7 @@ pub fn evaluate(frame: &Frame, relative: [[f32; 3]; 3], primitive: u32) -> Hit {
 #[inline(always)]
 fn weigh(frame: &Frame, [u, v, w]: [f64; 3], [a, b, c]: [f64; 3], primitive: u32) -> Hit {
     let determinant = u + v + w;
-    let depth = f64::from(frame.direction[frame.axes[2] as usize]);
+    let depth = f64::from(frame.depth);
     let t = ((u * a + v * b + w * c) / (determinant * depth)) as f32;
     Hit { t, primitive, u: (v / determinant) as f32, v: (w / determinant) as f32 }
 }

@@ -63,6 +63,12 @@ pub trait Arithmetic: Copy + Send + Sync + 'static {
     fn if_ge(self, a: Self::F32, b: Self::F32, first: Self::F32, second: Self::F32) -> Self::F32;
     /// Bit `i` is set where lane `i` has a <= b.
     fn le(self, a: Self::F32, b: Self::F32) -> u32;
+    /// Bit `i` is set where lane `i` has a < 0 < b.
+    fn straddles_zero(self, a: Self::F32, b: Self::F32) -> u32;
+    /// The first in the lanes whose bits are set, else the second.
+    fn select(self, lanes: u32, first: Self::F32, second: Self::F32) -> Self::F32;
+    /// In every lane the number of the row that the lowest two bits of `index` say.
+    fn pick(self, row: &[f32; 4], index: Self::F32) -> Self::F32;
     /// The magnitude of each.
     #[inline(always)]
     fn abs(self, value: Self::F32) -> Self::F32 {
@@ -98,10 +104,13 @@ pub trait Simd: Arithmetic {
     fn store(self, value: Self::F32) -> [f32; 8];
     /// Sixteen numbers to memory.
     fn store_wide(self, value: <Self::Wide as Arithmetic>::F32) -> [f32; 16];
+    /// The columns of sixteen rows.
+    fn columns(self, rows: &[&[f32; 4]; 16]) -> [<Self::Wide as Arithmetic>::F32; 4] {
+        let half = |k: usize, half: usize| self.load(&std::array::from_fn(|row| rows[8 * half + row][k]));
+        std::array::from_fn(|k| self.both([half(k, 0), half(k, 1)]))
+    }
     /// Rows to columns.
     fn transpose(self, rows: [Self::F32; 8]) -> [Self::F32; 8];
-    /// Bit `i` is set where lane `i` has a < 0 < b.
-    fn straddles_zero(self, a: Self::F32, b: Self::F32) -> u32;
     /// The same numbers in double precision.
     fn widen(self, value: Self::F32) -> Self::F64;
     /// The nearest numbers in single precision, ties to even, as `as f32` rounds.

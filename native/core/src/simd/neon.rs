@@ -66,10 +66,11 @@ fn quarter_bits(_: Neon, set: [uint64x2_t; 4]) -> u32 {
     bits
 }
 
+const WEIGHTS: [u32; 8] = [1, 2, 4, 8, 16, 32, 64, 128];
+
 /// The halves of comparisons as bits.
 #[inline(always)]
 fn bits(_: Neon, [low, high]: [uint32x4_t; 2]) -> u32 {
-    const WEIGHTS: [u32; 8] = [1, 2, 4, 8, 16, 32, 64, 128];
     // SAFETY: the token exists only where NEON was detected; the array has eight readable numbers.
     unsafe {
         let weigh = |lanes, first: usize| vandq_u32(lanes, vld1q_u32(WEIGHTS[first..].as_ptr()));
@@ -143,6 +144,26 @@ impl Arithmetic for Neon {
     fn le(self, a: Pair, b: Pair) -> u32 {
         bits(self, halves!(a, b => vcleq_f32(a, b)))
     }
+    #[inline(always)]
+    fn straddles_zero(self, a: Pair, b: Pair) -> u32 {
+        bits(self, halves!(a, b => vandq_u32(vcltzq_f32(a), vcgtzq_f32(b))))
+    }
+    #[inline(always)]
+    fn select(self, lanes: u32, first: Pair, second: Pair) -> Pair {
+        // SAFETY: as for `splat`; the array has eight readable numbers.
+        let bits = unsafe { [vld1q_u32(WEIGHTS.as_ptr()), vld1q_u32(WEIGHTS[4..].as_ptr())] };
+        halves!(bits, first, second => vbslq_f32(vtstq_u32(vdupq_n_u32(lanes), bits), first, second))
+    }
+    #[inline(always)]
+    fn pick(self, row: &[f32; 4], index: Pair) -> Pair {
+        // SAFETY: as for `splat`; the array has four readable numbers.
+        let row = unsafe { vreinterpretq_u8_f32(vld1q_f32(row.as_ptr())) };
+        halves!(index => {
+            let index = vandq_u32(vreinterpretq_u32_f32(index), vdupq_n_u32(3));
+            let bytes = vaddq_u32(vmulq_u32(index, vdupq_n_u32(0x0404_0404)), vdupq_n_u32(0x0302_0100));
+            vreinterpretq_f32_u8(vqtbl1q_u8(row, vreinterpretq_u8_u32(bytes)))
+        })
+    }
 }
 
 impl Simd for Neon {
@@ -200,10 +221,6 @@ impl Simd for Neon {
     fn transpose(self, rows: [Pair; 8]) -> [Pair; 8] {
         let rows = rows.map(|row| self.store(row));
         std::array::from_fn(|column| self.load(&std::array::from_fn(|row| rows[row][column])))
-    }
-    #[inline(always)]
-    fn straddles_zero(self, a: Pair, b: Pair) -> u32 {
-        bits(self, halves!(a, b => vandq_u32(vcltzq_f32(a), vcgtzq_f32(b))))
     }
     #[inline(always)]
     fn widen(self, [a, b]: Pair) -> Quad {

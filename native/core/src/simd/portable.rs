@@ -80,6 +80,18 @@ impl Arithmetic for Portable {
     fn le(self, a: [f32; 8], b: [f32; 8]) -> u32 {
         bits(|i| a[i] <= b[i])
     }
+    #[inline(always)]
+    fn straddles_zero(self, a: [f32; 8], b: [f32; 8]) -> u32 {
+        bits(|i| (a[i] < 0.0) & (b[i] > 0.0))
+    }
+    #[inline(always)]
+    fn select(self, lanes: u32, first: [f32; 8], second: [f32; 8]) -> [f32; 8] {
+        std::array::from_fn(|i| if lanes >> i & 1 == 1 { first[i] } else { second[i] })
+    }
+    #[inline(always)]
+    fn pick(self, row: &[f32; 4], index: [f32; 8]) -> [f32; 8] {
+        index.map(|index| row[index.to_bits() as usize & 3])
+    }
 }
 
 impl Simd for Portable {
@@ -127,10 +139,6 @@ impl Simd for Portable {
     #[inline(always)]
     fn transpose(self, rows: [[f32; 8]; 8]) -> [[f32; 8]; 8] {
         std::array::from_fn(|column| std::array::from_fn(|row| rows[row][column]))
-    }
-    #[inline(always)]
-    fn straddles_zero(self, a: [f32; 8], b: [f32; 8]) -> u32 {
-        bits(|i| (a[i] < 0.0) & (b[i] > 0.0))
     }
     #[inline(always)]
     fn widen(self, value: [f32; 8]) -> [f64; 8] {

@@ -95,4 +95,26 @@ impl Arithmetic for Zmm {
         // SAFETY: as for `splat`.
         u32::from(unsafe { _mm512_cmp_ps_mask::<_CMP_LE_OQ>(a, b) })
     }
+    #[inline(always)]
+    fn straddles_zero(self, a: __m512, b: __m512) -> u32 {
+        // SAFETY: as for `splat`.
+        unsafe {
+            let zero = _mm512_setzero_ps();
+            let below = _mm512_cmp_ps_mask::<_CMP_LT_OQ>(a, zero);
+            u32::from(_mm512_mask_cmp_ps_mask::<_CMP_GT_OQ>(below, b, zero))
+        }
+    }
+    #[inline(always)]
+    fn select(self, lanes: u32, first: __m512, second: __m512) -> __m512 {
+        // SAFETY: as for `splat`.
+        unsafe { _mm512_mask_blend_ps(lanes as u16, second, first) }
+    }
+    #[inline(always)]
+    fn pick(self, row: &[f32; 4], index: __m512) -> __m512 {
+        // SAFETY: as for `splat`; the reference is to 16 readable bytes and the load asks for no alignment.
+        unsafe {
+            let row = _mm512_broadcast_f32x4(_mm_loadu_ps(row.as_ptr()));
+            _mm512_permutevar_ps(row, _mm512_castps_si512(index))
+        }
+    }
 }

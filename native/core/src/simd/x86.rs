@@ -115,6 +115,14 @@ macro_rules! arithmetic {
             unsafe { _mm256_xor_ps(a, b) }
         }
         #[inline(always)]
+        fn pick(self, row: &[f32; 4], index: __m256) -> __m256 {
+            // SAFETY: as for `splat`; the reference is to 16 readable bytes and the load asks for no alignment.
+            unsafe {
+                let row = _mm_loadu_ps(row.as_ptr());
+                _mm256_permutevar_ps(_mm256_set_m128(row, row), _mm256_castps_si256(index))
+            }
+        }
+        #[inline(always)]
         fn sub_bits(self, a: __m256, b: __m256) -> __m256 {
             // SAFETY: a token exists only where AVX2 was detected.
             unsafe { _mm256_castsi256_ps(_mm256_sub_epi32(_mm256_castps_si256(a), _mm256_castps_si256(b))) }
@@ -251,6 +259,25 @@ impl Arithmetic for Avx2 {
         // SAFETY: as for `splat`.
         unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(a, b)) as u32 }
     }
+    #[inline(always)]
+    fn straddles_zero(self, a: __m256, b: __m256) -> u32 {
+        // SAFETY: as for `splat`.
+        unsafe {
+            let zero = _mm256_setzero_ps();
+            let below = _mm256_cmp_ps::<_CMP_LT_OQ>(a, zero);
+            let above = _mm256_cmp_ps::<_CMP_GT_OQ>(b, zero);
+            _mm256_movemask_ps(_mm256_and_ps(below, above)) as u32
+        }
+    }
+    #[inline(always)]
+    fn select(self, lanes: u32, first: __m256, second: __m256) -> __m256 {
+        // SAFETY: a token exists only where AVX2 was detected.
+        unsafe {
+            let bits = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+            let set = _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_set1_epi32(lanes as i32), bits), bits);
+            _mm256_blendv_ps(second, first, _mm256_castsi256_ps(set))
+        }
+    }
 }
 
 impl Simd for Avx2 {
@@ -275,6 +302,28 @@ impl Simd for Avx2 {
         [self.load(low), self.load(high)]
     }
     #[inline(always)]
+    fn columns(self, rows: &[&[f32; 4]; 16]) -> [[__m256; 2]; 4] {
+        let mut columns = [[self.splat(0.0); 2]; 4];
+        for half in 0..2 {
+            let mut quads = [self.splat(0.0); 4];
+            for first in 0..4 {
+                quads[first] = self.join(rows[8 * half + first], rows[8 * half + 4 + first]);
+            }
+            // SAFETY: as for `splat`.
+            unsafe {
+                let a = _mm256_unpacklo_ps(quads[0], quads[1]);
+                let b = _mm256_unpackhi_ps(quads[0], quads[1]);
+                let c = _mm256_unpacklo_ps(quads[2], quads[3]);
+                let d = _mm256_unpackhi_ps(quads[2], quads[3]);
+                columns[0][half] = _mm256_shuffle_ps::<0x44>(a, c);
+                columns[1][half] = _mm256_shuffle_ps::<0xee>(a, c);
+                columns[2][half] = _mm256_shuffle_ps::<0x44>(b, d);
+                columns[3][half] = _mm256_shuffle_ps::<0xee>(b, d);
+            }
+        }
+        columns
+    }
+    #[inline(always)]
     fn store_wide(self, value: [__m256; 2]) -> [f32; 16] {
         bytemuck::cast([self.store(value[0]), self.store(value[1])])
     }
@@ -284,16 +333,6 @@ impl Simd for Avx2 {
         unsafe { enter_avx2(self, kernel) }
     }
     vectors!();
-    #[inline(always)]
-    fn straddles_zero(self, a: __m256, b: __m256) -> u32 {
-        // SAFETY: as for `splat`.
-        unsafe {
-            let zero = _mm256_setzero_ps();
-            let below = _mm256_cmp_ps::<_CMP_LT_OQ>(a, zero);
-            let above = _mm256_cmp_ps::<_CMP_GT_OQ>(b, zero);
-            _mm256_movemask_ps(_mm256_and_ps(below, above)) as u32
-        }
-    }
     #[inline(always)]
     fn compact(self, masks: &[u8], bit: u32, ids: &[u16], out: &mut [u16]) -> usize {
         let mut count = 0;
@@ -322,6 +361,20 @@ impl Arithmetic for Avx512 {
         // SAFETY: a token exists only where AVX-512 F and VL were detected.
         u32::from(unsafe { _mm256_cmp_ps_mask::<_CMP_LE_OQ>(a, b) })
     }
+    #[inline(always)]
+    fn straddles_zero(self, a: __m256, b: __m256) -> u32 {
+        // SAFETY: as for `le`.
+        unsafe {
+            let zero = _mm256_setzero_ps();
+            let below = _mm256_cmp_ps_mask::<_CMP_LT_OQ>(a, zero);
+            u32::from(_mm256_mask_cmp_ps_mask::<_CMP_GT_OQ>(below, b, zero))
+        }
+    }
+    #[inline(always)]
+    fn select(self, lanes: u32, first: __m256, second: __m256) -> __m256 {
+        // SAFETY: as for `le`.
+        unsafe { _mm256_mask_blend_ps(lanes as u8, second, first) }
+    }
 }
 
 impl Simd for Avx512 {
@@ -349,6 +402,32 @@ impl Simd for Avx512 {
         unsafe { _mm512_loadu_ps(values.as_ptr()) }
     }
     #[inline(always)]
+    fn columns(self, rows: &[&[f32; 4]; 16]) -> [__m512; 4] {
+        let mut quads = [self.wide().splat(0.0); 4];
+        for first in 0..4 {
+            // SAFETY: as for `both`; every reference is to 16 readable bytes and the loads ask for no alignment.
+            unsafe {
+                let quad = _mm512_castps128_ps512(_mm_loadu_ps(rows[first].as_ptr()));
+                let quad = _mm512_insertf32x4::<1>(quad, _mm_loadu_ps(rows[4 + first].as_ptr()));
+                let quad = _mm512_insertf32x4::<2>(quad, _mm_loadu_ps(rows[8 + first].as_ptr()));
+                quads[first] = _mm512_insertf32x4::<3>(quad, _mm_loadu_ps(rows[12 + first].as_ptr()));
+            }
+        }
+        // SAFETY: as for `both`.
+        unsafe {
+            let a = _mm512_unpacklo_ps(quads[0], quads[1]);
+            let b = _mm512_unpackhi_ps(quads[0], quads[1]);
+            let c = _mm512_unpacklo_ps(quads[2], quads[3]);
+            let d = _mm512_unpackhi_ps(quads[2], quads[3]);
+            [
+                _mm512_shuffle_ps::<0x44>(a, c),
+                _mm512_shuffle_ps::<0xee>(a, c),
+                _mm512_shuffle_ps::<0x44>(b, d),
+                _mm512_shuffle_ps::<0xee>(b, d),
+            ]
+        }
+    }
+    #[inline(always)]
     fn store_wide(self, value: __m512) -> [f32; 16] {
         let mut values = [0.0; 16];
         // SAFETY: as for `both`; the array is 64 writable bytes and the store asks for no alignment.
@@ -361,15 +440,6 @@ impl Simd for Avx512 {
         unsafe { enter_avx512(self, kernel) }
     }
     vectors!();
-    #[inline(always)]
-    fn straddles_zero(self, a: __m256, b: __m256) -> u32 {
-        // SAFETY: as for `le`.
-        unsafe {
-            let zero = _mm256_setzero_ps();
-            let below = _mm256_cmp_ps_mask::<_CMP_LT_OQ>(a, zero);
-            u32::from(_mm256_mask_cmp_ps_mask::<_CMP_GT_OQ>(below, b, zero))
-        }
-    }
     #[inline(always)]
     fn compact(self, masks: &[u8], bit: u32, ids: &[u16], out: &mut [u16]) -> usize {
         let mut count = 0;

@@ -1,71 +1,78 @@
-//! The exact hits of rays whose triangle is known, eight at once.
+//! The exact hits of rays whose triangle is known, sixteen at once.
 
 use super::{exact::Exact, frame::Frame};
-use crate::{mesh::Reader, ray::Hit, simd::Simd, triangle::LANES};
+use crate::{
+    mesh::Reader,
+    ray::Hit,
+    simd::{Arithmetic, Simd},
+    triangle::LANES,
+};
 
-/// Up to eight rays, and the triangle that each is known to hit.
-pub struct Answers {
-    corner: [[[f32; LANES]; 3]; 3],
-    shear: [[f32; LANES]; 2],
-    depth: [f32; LANES],
-    primitive: [u32; LANES],
-    slot: [usize; LANES],
-    count: usize,
+/// Rays that are evaluated at once.
+pub const RAYS: usize = 16;
+
+/// A ray, and the triangle that it is known to hit.
+#[derive(Clone, Copy)]
+pub struct Answer<'a> {
+    /// By whatever name the ray has.
+    pub slot: usize,
+    pub frame: &'a Frame,
+    pub primitive: u32,
 }
 
-impl Answers {
-    /// No rays.
-    pub const EMPTY: Self = Self {
-        corner: [[[0.0; LANES]; 3]; 3],
-        shear: [[0.0; LANES]; 2],
-        depth: [1.0; LANES],
-        primitive: [0; LANES],
-        slot: [0; LANES],
-        count: 0,
-    };
-
-    /// Add a ray, by whatever name it has; there must be room.
-    #[inline(always)]
-    pub fn push(&mut self, slot: usize, frame: &Frame, mesh: Reader<'_>, primitive: u32) {
-        let (lane, corners) = (self.count, mesh.places(primitive));
-        for k in 0..3 {
-            let axis = frame.axes[k] as usize;
-            for c in 0..3 {
-                self.corner[c][k][lane] = corners[c][axis] - frame.origin[axis];
-            }
-        }
-        self.shear[0][lane] = frame.shear[0];
-        self.shear[1][lane] = frame.shear[1];
-        self.depth[lane] = frame.direction[frame.axes[2] as usize];
-        self.primitive[lane] = primitive;
-        self.slot[lane] = slot;
-        self.count += 1;
+/// The hits of sixteen rays, in their frames' units, to the bit those of [`triangle::evaluate`](crate::triangle::evaluate).
+#[inline(always)]
+pub fn evaluate<S: Simd>(simd: S, answers: &[Answer<'_>; RAYS], mesh: Reader<'_>) -> [Hit; RAYS] {
+    let wide = simd.wide();
+    let row: &[f32; 4] = &[0.0; 4];
+    let [mut a, mut b, mut c, mut first, mut second, mut third] = [[row; RAYS]; 6];
+    for (lane, answer) in answers.iter().enumerate() {
+        [a[lane], b[lane], c[lane]] = mesh.rows(answer.primitive);
+        [first[lane], second[lane], third[lane]] = answer.frame.sheared();
     }
-
-    /// Whether no more rays fit.
-    #[inline(always)]
-    pub fn is_full(&self) -> bool {
-        self.count == LANES
-    }
-
-    /// Names and hits of all rays, in the frames' units, as many as the last number says; the rays are then forgotten.
-    #[inline(always)]
-    pub fn take<S: Simd>(&mut self, simd: S) -> ([(usize, Hit); LANES], usize) {
-        let zero = simd.splat(0.0);
-        let mut corners = [[zero; 3]; 3];
-        for c in 0..3 {
-            for k in 0..3 {
-                corners[c][k] = simd.load(&self.corner[c][k]);
-            }
-        }
-        let shear = [simd.load(&self.shear[0]), simd.load(&self.shear[1])];
-        let exact = Exact::new(simd, &corners, shear, simd.load(&self.depth));
+    let [x, y, z, _] = simd.columns(&first);
+    let [across, along, kx, ky] = simd.columns(&second);
+    let [kz, depth, ..] = simd.columns(&third);
+    let (origin, axes) = ([x, y, z], [kx, ky, kz]);
+    let corners = [
+        relative(wide, simd.columns(&a), axes, origin),
+        relative(wide, simd.columns(&b), axes, origin),
+        relative(wide, simd.columns(&c), axes, origin),
+    ];
+    let mut hits = [Hit::MISS; RAYS];
+    let (across, along, depth) = (simd.halves(across), simd.halves(along), simd.halves(depth));
+    let corners = halves(simd, &corners);
+    for half in 0..2 {
+        let exact = Exact::new(simd, &corners[half], [across[half], along[half]], depth[half]);
         let (t, u, v) = (simd.store(exact.t), simd.store(exact.u), simd.store(exact.v));
-        let mut hits = [(0, Hit::MISS); LANES];
         for lane in 0..LANES {
-            let hit = Hit { t: t[lane], primitive: self.primitive[lane], u: u[lane], v: v[lane] };
-            hits[lane] = (self.slot[lane], hit);
+            let place = LANES * half + lane;
+            hits[place] = Hit { t: t[lane], primitive: answers[place].primitive, u: u[lane], v: v[lane] };
         }
-        (hits, std::mem::take(&mut self.count))
     }
+    hits
+}
+
+/// A corner relative to the origin, in the order of the axes.
+#[inline(always)]
+fn relative<W: Arithmetic>(wide: W, [x, y, z, _]: [W::F32; 4], axes: [W::F32; 3], origin: [W::F32; 3]) -> [W::F32; 3] {
+    let (one, two) = (wide.splat(f32::from_bits(1)), wide.splat(f32::from_bits(2)));
+    let mut relative = origin;
+    for k in 0..3 {
+        let place = wide.if_ge(axes[k], two, z, wide.if_ge(axes[k], one, y, x));
+        relative[k] = wide.sub(place, origin[k]);
+    }
+    relative
+}
+
+#[inline(always)]
+fn halves<S: Simd>(simd: S, corners: &[[<S::Wide as Arithmetic>::F32; 3]; 3]) -> [[[S::F32; 3]; 3]; 2] {
+    let zero = simd.splat(0.0);
+    let mut halves = [[[zero; 3]; 3]; 2];
+    for c in 0..3 {
+        for k in 0..3 {
+            [halves[0][c][k], halves[1][c][k]] = simd.halves(corners[c][k]);
+        }
+    }
+    halves
 }

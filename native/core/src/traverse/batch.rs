@@ -221,7 +221,7 @@ impl Tracer<'_> {
     /// milliseconds of work where rays walk through grids alone.
     fn part(self, rays: &Rays<'_>, threads: usize) -> usize {
         let alone = self.structure.has_grids() && self.structure.lazy.is_empty();
-        let most = if alone { PART } else { waiting::MOST };
+        let most = if alone { PART } else { waiting::most() };
         if rays.len() <= PART { PART } else { rays.len().div_ceil(4 * thread_count(threads)).clamp(PART, most) }
     }
 }

@@ -15,7 +15,7 @@
 
 use super::frame::Frame;
 use crate::{
-    simd::Simd,
+    simd::{Arithmetic, Simd},
     triangle::{Block, LANES},
 };
 
@@ -28,19 +28,28 @@ const DEPTH_ERROR: f32 = 32.0 / (1 << 24) as f32;
 /// See the module's text.
 const LEAST_DEPTH: f32 = 1e-18;
 
-/// A block's triangles in the sheared space of a ray.
-pub struct Sheared<S: Simd> {
+/// Triangles in the sheared space of a ray, or one triangle in those of several rays.
+pub struct Sheared<S: Arithmetic> {
     depth: [S::F32; 3],
     edge: [S::F32; 3],
     product: [S::F32; 3],
 }
 
-/// Where a ray crosses the triangles of a block, if it does.
-pub struct Crossings {
+/// One triangle before sixteen rays, in memory.
+#[derive(Debug, Clone, Copy, Default)]
+#[repr(align(64))]
+pub struct Stored {
+    depth: [[f32; 16]; 3],
+    edge: [[f32; 16]; 3],
+    product: [[f32; 16]; 3],
+}
+
+/// Where rays cross triangles, if they do.
+pub struct Crossings<S: Arithmetic> {
     /// For every lane a parameter before the crossing.
-    pub low: [f32; LANES],
+    pub low: S::F32,
     /// And one behind it.
-    pub high: [f32; LANES],
+    pub high: S::F32,
     /// The lanes that are surely hit within the interval asked for.
     pub sure: u32,
     /// The lanes that are surely not hit within it.
@@ -48,14 +57,56 @@ pub struct Crossings {
 }
 
 impl<S: Simd> Sheared<S> {
-    /// Corners and edge functions, as the exact test has them before its arithmetic is in double precision.
+    /// A block's triangles before one ray.
     #[inline(always)]
-    pub fn new(simd: S, frame: &Frame, block: &Block) -> Self {
-        let a = shear(simd, frame, &block.corner[0]);
-        let b = shear(simd, frame, &block.corner[1]);
-        let c = shear(simd, frame, &block.corner[2]);
+    pub fn of_block(simd: S, frame: &Frame, block: &Block) -> Self {
+        let origin = [simd.splat(frame.origin[0]), simd.splat(frame.origin[1]), simd.splat(frame.origin[2])];
+        let shear = [simd.splat(frame.shear[0]), simd.splat(frame.shear[1])];
+        let a = in_order(simd, frame, &block.corner[0]);
+        let b = in_order(simd, frame, &block.corner[1]);
+        let c = in_order(simd, frame, &block.corner[2]);
+        Self::new(simd, [a, b, c], origin, shear)
+    }
+}
+
+/// Corners in the order of a ray's axes.
+#[inline(always)]
+fn in_order<S: Simd>(simd: S, frame: &Frame, corner: &[[f32; LANES]; 3]) -> [S::F32; 3] {
+    let [x, y, z] = frame.axes;
+    [simd.load(&corner[x as usize]), simd.load(&corner[y as usize]), simd.load(&corner[z as usize])]
+}
+
+impl<S: Arithmetic> Sheared<S> {
+    /// Corners and edge functions, as the exact test has them before its arithmetic is in double precision; corners and
+    /// origins are in the order of the rays' axes.
+    #[inline(always)]
+    pub fn new(simd: S, [a, b, c]: [[S::F32; 3]; 3], origin: [S::F32; 3], shears: [S::F32; 2]) -> Self {
+        let a = shear(simd, a, origin, shears);
+        let b = shear(simd, b, origin, shears);
+        let c = shear(simd, c, origin, shears);
         let (u, v, w) = (edge(simd, c, b), edge(simd, a, c), edge(simd, b, a));
         Self { depth: [a[2], b[2], c[2]], edge: [u.0, v.0, w.0], product: [u.1, v.1, w.1] }
+    }
+
+    /// Write down.
+    #[inline(always)]
+    pub fn store<W: Simd<Wide = S>>(&self, simd: W, to: &mut Stored) {
+        for k in 0..3 {
+            to.depth[k] = simd.store_wide(self.depth[k]);
+            to.edge[k] = simd.store_wide(self.edge[k]);
+            to.product[k] = simd.store_wide(self.product[k]);
+        }
+    }
+
+    /// Read what was written down.
+    #[inline(always)]
+    pub fn load<W: Simd<Wide = S>>(simd: W, from: &Stored) -> Self {
+        let Stored { depth, edge, product } = from;
+        Self {
+            depth: [simd.load_wide(&depth[0]), simd.load_wide(&depth[1]), simd.load_wide(&depth[2])],
+            edge: [simd.load_wide(&edge[0]), simd.load_wide(&edge[1]), simd.load_wide(&edge[2])],
+            product: [simd.load_wide(&product[0]), simd.load_wide(&product[1]), simd.load_wide(&product[2])],
+        }
     }
 
     /// The lanes in which two edge functions have opposite signs. Rounding is monotonic, so they have them exactly, too;
@@ -72,9 +123,9 @@ impl<S: Simd> Sheared<S> {
         (simd.min(simd.min(u, v), w), simd.max(simd.max(u, v), w))
     }
 
-    /// The crossings, of which those between `tmin` and `tmax` are wanted.
+    /// The crossings, of which those between `tmin` and `tmax` are wanted; `steepness` is that of the rays' frames.
     #[inline(always)]
-    pub fn cross(&self, simd: S, frame: &Frame, tmin: f32, tmax: f32) -> Crossings {
+    pub fn cross(&self, simd: S, steepness: S::F32, tmin: S::F32, tmax: S::F32) -> Crossings<S> {
         let ([a, b, c], [u, v, w]) = (self.depth, self.edge);
         let sum = simd.add(simd.add(u, v), w);
         let weighted = simd.mul_add(w, c, simd.mul_add(v, b, simd.mul(u, a)));
@@ -84,53 +135,42 @@ impl<S: Simd> Sheared<S> {
         let error = simd.mul_add(sum, zero, simd.mul_add(weighted, zero, error));
 
         let reciprocal = simd.div(simd.splat(1.0), sum);
-        let steepness = simd.splat(frame.inverse[frame.axes[2] as usize]);
         let t = simd.mul(simd.mul(weighted, reciprocal), steepness);
         let share = simd.mul(simd.mul(error, simd.splat(8.0)), simd.abs(reciprocal));
         let reach = simd.max(greatest(simd, self.depth), simd.splat(LEAST_DEPTH));
         let doubt = simd.mul(reach, simd.add(share, simd.splat(DEPTH_ERROR)));
         let (low, high) = (simd.sub(t, doubt), simd.add(t, doubt));
 
-        let (tmin, tmax) = (simd.splat(tmin), simd.splat(tmax));
         let (least, greatest) = self.extremes(simd);
         let clear = simd.le(error, simd.max(least, simd.sub(zero, greatest)));
         Crossings {
             sure: clear & simd.le(tmin, low) & simd.le(high, tmax),
             outside: simd.le(high, tmin) | simd.le(tmax, low),
-            low: simd.store(low),
-            high: simd.store(high),
+            low,
+            high,
         }
     }
 }
 
 /// Corners in sheared space, rounded as in the exact test.
 #[inline(always)]
-fn shear<S: Simd>(simd: S, frame: &Frame, corner: &[[f32; LANES]; 3]) -> [S::F32; 3] {
-    let [kx, ky, kz] = frame.axes;
-    let x = relative(simd, frame, corner, kx);
-    let y = relative(simd, frame, corner, ky);
-    let z = relative(simd, frame, corner, kz);
-    let x = simd.sub(x, simd.mul(simd.splat(frame.shear[0]), z));
-    let y = simd.sub(y, simd.mul(simd.splat(frame.shear[1]), z));
+fn shear<S: Arithmetic>(simd: S, corner: [S::F32; 3], origin: [S::F32; 3], shear: [S::F32; 2]) -> [S::F32; 3] {
+    let z = simd.sub(corner[2], origin[2]);
+    let x = simd.sub(simd.sub(corner[0], origin[0]), simd.mul(shear[0], z));
+    let y = simd.sub(simd.sub(corner[1], origin[1]), simd.mul(shear[1], z));
     [x, y, z]
-}
-
-#[inline(always)]
-fn relative<S: Simd>(simd: S, frame: &Frame, corner: &[[f32; LANES]; 3], axis: u32) -> S::F32 {
-    let axis = axis as usize;
-    simd.sub(simd.load(&corner[axis]), simd.splat(frame.origin[axis]))
 }
 
 /// Twice the signed areas of the triangles of the origin, `p` and `q`, and the products they come from that are
 /// subtracted last.
 #[inline(always)]
-fn edge<S: Simd>(simd: S, p: [S::F32; 3], q: [S::F32; 3]) -> (S::F32, S::F32) {
+fn edge<S: Arithmetic>(simd: S, p: [S::F32; 3], q: [S::F32; 3]) -> (S::F32, S::F32) {
     let product = simd.mul(p[1], q[0]);
     (simd.sub(simd.mul(p[0], q[1]), product), product)
 }
 
 /// The greatest magnitude of three.
 #[inline(always)]
-fn greatest<S: Simd>(simd: S, [a, b, c]: [S::F32; 3]) -> S::F32 {
+fn greatest<S: Arithmetic>(simd: S, [a, b, c]: [S::F32; 3]) -> S::F32 {
     simd.max(simd.max(simd.abs(a), simd.abs(b)), simd.abs(c))
 }

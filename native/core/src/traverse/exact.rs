@@ -83,7 +83,7 @@ mod tests {
         fn run<S: Simd>(self, simd: S) -> Self::Output {
             let Self(frame, triangles) = self;
             let axes = frame.axes.map(|axis| axis as usize);
-            let lanes = |c: usize, k: usize| std::array::from_fn(|i| triangles[i][c][axes[k]] - frame.origin[axes[k]]);
+            let lanes = |c: usize, k: usize| std::array::from_fn(|i| triangles[i][c][axes[k]] - frame.origin[k]);
             let corners = [0, 1, 2].map(|c| [0, 1, 2].map(|k| simd.load(&lanes(c, k))));
             let depth = simd.splat(frame.direction[axes[2]]);
             let exact = Exact::new(simd, &corners, frame.shear.map(|shear| simd.splat(shear)), depth);

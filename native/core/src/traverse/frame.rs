@@ -80,16 +80,20 @@ pub struct Frame {
     /// Origin relative to the centre of the domain.
     pub local: [f32; 3],
     pub(super) advance: f64,
-    /// Origin of the triangle test, in the mesh's own coordinates.
+    /// Origin of the triangle test, in the mesh's own coordinates but in the order of the axes.
     pub origin: [f32; 3],
+    /// Inverse of the dominant component of the direction.
+    pub steepness: f32,
     /// Direction over its dominant component, for the sheared x and y.
     pub shear: [f32; 2],
     /// Axes in the order x, y, z of the sheared space; z is the direction's dominant one.
     pub axes: [u32; 3],
+    /// The direction's dominant component.
+    pub depth: f32,
     /// Direction, its largest component in [1, 2).
     pub direction: [f32; 3],
     pub(super) scale: f32,
-    pub(super) unused: [f32; 4],
+    pub(super) unused: [f32; 2],
 }
 
 impl Frame {
@@ -148,13 +152,14 @@ impl Frame {
         self.tmax = tmax;
         self.local = local.to_array();
         self.advance = 0.0;
-        self.origin = origin.to_array();
         self.direction = direction.to_array();
         self.axes = dominant_last(direction);
         self.scale = 1.0;
         let [x, y, steepest] = self.axes.map(|axis| axis as usize);
-        let steepness = self.inverse[steepest];
-        self.shear = [self.direction[x] * steepness, self.direction[y] * steepness];
+        self.origin = [origin[x], origin[y], origin[steepest]];
+        self.depth = direction[steepest];
+        self.steepness = self.inverse[steepest];
+        self.shear = [self.direction[x] * self.steepness, self.direction[y] * self.steepness];
     }
 
     /// Become the frame of a ray whose origin is far, begun two half extents before the closest approach to the scene's
@@ -191,6 +196,14 @@ impl Frame {
             far = far.min(last * self.inverse[k] + self.far_bias[k]);
         }
         (near <= far).then_some(near)
+    }
+
+    /// What triangle tests need: origin and steepness, then shear and two axes, then the last axis and the depth; axes
+    /// are bits.
+    #[inline(always)]
+    pub(super) fn sheared(&self) -> [&[f32; 4]; 3] {
+        let numbers: &[[f32; 4]; 8] = bytemuck::cast_ref(self);
+        [&numbers[4], &numbers[5], &numbers[6]]
     }
 
     /// The signs of the direction: bit `k` is set where it falls along axis `k`.

@@ -26,8 +26,9 @@ impl Best {
         Self { low: tmax, high: tmax, primitive: MISS }
     }
 
+    /// An exact hit.
     #[inline(always)]
-    fn exactly(hit: &Hit) -> Self {
+    pub fn exactly(hit: &Hit) -> Self {
         Self { low: hit.t, high: hit.t, primitive: hit.primitive }
     }
 
@@ -38,6 +39,18 @@ impl Best {
             return Hit::MISS;
         }
         triangle::evaluate(frame, triangle::relative(frame, mesh.reader().places(self.primitive)), self.primitive)
+    }
+
+    /// The first of two hits.
+    #[inline(always)]
+    pub fn or(self, other: Self, frame: &Frame, mesh: &Mesh) -> Self {
+        if other.high < self.low {
+            other
+        } else if other.low > self.high {
+            self
+        } else {
+            self.settle(other, frame, mesh)
+        }
     }
 
     /// Which of two hits whose intervals overlap comes first.
@@ -102,7 +115,7 @@ impl<'a, S: Simd, P: Probe> Search<'a, S, P> {
     #[inline(always)]
     fn test<const ANY: bool>(&mut self, block: &Block, count: u32, place: &mut usize) -> bool {
         self.probe.tests(count);
-        let sheared = Sheared::new(self.simd, self.frame, block);
+        let sheared = Sheared::of_block(self.simd, self.frame, block);
         let candidates = !sheared.missed(self.simd) & ((1 << count) - 1);
         candidates != 0 && self.candidates::<ANY>(block, &sheared, candidates, place)
     }
@@ -116,18 +129,21 @@ impl<'a, S: Simd, P: Probe> Search<'a, S, P> {
         candidates: u32,
         place: &mut usize,
     ) -> bool {
-        let crossings = sheared.cross(self.simd, self.frame, self.frame.tmin, self.best.high);
+        let (simd, frame) = (self.simd, self.frame);
+        let interval = (simd.splat(frame.tmin), simd.splat(self.best.high));
+        let crossings = sheared.cross(simd, simd.splat(frame.steepness), interval.0, interval.1);
         let mut candidates = candidates & !crossings.outside;
         if ANY && candidates & crossings.sure != 0 {
             self.best.primitive =
                 block.primitive[(candidates & crossings.sure).trailing_zeros() as usize & (LANES - 1)];
             return true;
         }
+        let (low, high) = (simd.store(crossings.low), simd.store(crossings.high));
         while candidates != 0 {
             let lane = candidates.trailing_zeros() as usize & (LANES - 1);
             candidates &= candidates - 1;
             let hit = if crossings.sure >> lane & 1 == 1 {
-                Best { low: crossings.low[lane], high: crossings.high[lane], primitive: block.primitive[lane] }
+                Best { low: low[lane], high: high[lane], primitive: block.primitive[lane] }
             } else if let Some(hit) = block.intersect(lane, self.frame) {
                 Best::exactly(&hit)
             } else {
@@ -146,14 +162,7 @@ impl<'a, S: Simd, P: Probe> Search<'a, S, P> {
     /// Take the better of a hit and the best so far; true where it is the former.
     #[inline(always)]
     fn offer(&mut self, hit: Best) -> bool {
-        if hit.high < self.best.low {
-            self.best = hit;
-            return true;
-        }
-        if hit.low > self.best.high {
-            return false;
-        }
-        self.best = self.best.settle(hit, self.frame, self.mesh);
+        self.best = self.best.or(hit, self.frame, self.mesh);
         self.best.primitive == hit.primitive
     }
 

@@ -6,7 +6,8 @@ use std::{
     time::Instant,
 };
 
-use super::stream;
+/// Rays of a short stream, which a traverser of few rays is compared with.
+const STREAM: usize = 1 << 10;
 
 /// How two traversers are compared. Rays that keep together from one point or side by side make tiles, the tiles of
 /// rays where any hit will do being packets.
@@ -31,12 +32,11 @@ pub struct Terms {
 /// it: so both are measured over as many rays, and streams do not serve long. Against verdicts by the faster of two
 /// tiles, as for few rays, on a Xeon with AVX-512: the room in 1/1.3 to 1/1.6 of the time, reciprocating_saw 1/1.4, dragon
 /// 1/1.2, Sponza 1/1.1, bunny2 and Sibenik equal, stadium and hair_straight 1.07 times. Tiles alone: hair 1.5 times.
-const TILES: Terms =
-    Terms { tiles: 4, stream: stream::BIN, cheap: UNKNOWN, slow: 4.0, term: 1 << 15, retry: 4 * stream::BIN };
+const TILES: Terms = Terms { tiles: 4, stream: STREAM, cheap: UNKNOWN, slow: 4.0, term: 1 << 15, retry: 4 * STREAM };
 
 /// The rays of a small picture. Its tiles cover more, may take 2.4 microseconds a ray, and are soon all traced: by the
 /// terms above ten thousand rays took up to twice as long.
-const FEW_TILES: Terms = Terms { tiles: 2, stream: stream::BIN, cheap: 30.0, slow: 2.0, term: 1 << 15, retry: 1 << 15 };
+const FEW_TILES: Terms = Terms { tiles: 2, stream: STREAM, cheap: 30.0, slow: 2.0, term: 1 << 15, retry: 1 << 15 };
 
 /// Pictures of fewer rays are small.
 const FEW: usize = 1 << 16;
@@ -44,8 +44,7 @@ const FEW: usize = 1 << 16;
 /// Where any hit will do: packets and streams differ by less than half, and a stream must be long to show what it can. To
 /// gather and sort its rays takes as long as the cheapest packets, which are not compared: they see large triangles, and
 /// ambient occlusion there (hospital, vianney, room) takes 1/1.05 to 1/1.09 of the time.
-const PACKETS: Terms =
-    Terms { tiles: 2, stream: 8 * stream::BIN, cheap: 30.0, slow: 4.0, term: 1 << 17, retry: 1 << 17 };
+const PACKETS: Terms = Terms { tiles: 2, stream: 8 * STREAM, cheap: 30.0, slow: 4.0, term: 1 << 17, retry: 1 << 17 };
 
 /// Nanoseconds a ray that are expected of a stream where none was compared.
 const UNKNOWN: f64 = 150.0;

@@ -114,14 +114,13 @@ impl<S: Simd> Frames<S> {
     pub fn store(&self, simd: S, frames: &mut [Frame; LANES]) {
         let zero = simd.splat(0.0);
         let Self { tmin, tmax, scale, .. } = *self;
-        let (axes, shear) = shear(simd, self.direction, self.inverse);
-        let ([i, n, f], [l, o, d]) =
-            ([self.inverse, self.near_bias, self.far_bias], [self.local, self.origin, self.direction]);
+        let Sheared { axes, origin: o, depth, steepness, shear } = Sheared::new(simd, self);
+        let ([i, n, f], [l, d]) = ([self.inverse, self.near_bias, self.far_bias], [self.local, self.direction]);
         let rows = [
             simd.transpose([i[0], i[1], i[2], n[0], n[1], n[2], f[0], f[1]]),
             simd.transpose([f[2], tmin, tmax, l[0], l[1], l[2], zero, zero]),
-            simd.transpose([o[0], o[1], o[2], shear[0], shear[1], axes[0], axes[1], axes[2]]),
-            simd.transpose([d[0], d[1], d[2], scale, zero, zero, zero, zero]),
+            simd.transpose([o[0], o[1], o[2], steepness, shear[0], shear[1], axes[0], axes[1]]),
+            simd.transpose([axes[2], depth, d[0], d[1], d[2], scale, zero, zero]),
         ];
         for lane in 0..LANES {
             let [a, b, c, d] = rows;
@@ -138,22 +137,38 @@ fn halves<S: Simd>(simd: S, [x, y, z]: &[<S::Wide as Arithmetic>::F32; 3]) -> [[
     [[x[0], y[0], z[0]], [x[1], y[1], z[1]]]
 }
 
-/// The axes of the sheared space, as bits, and the direction over its dominant component.
+/// What frames have in the order of their axes.
+struct Sheared<S: Simd> {
+    /// As bits.
+    axes: [S::F32; 3],
+    origin: [S::F32; 3],
+    depth: S::F32,
+    steepness: S::F32,
+    shear: [S::F32; 2],
+}
+
+impl<S: Simd> Sheared<S> {
+    #[inline(always)]
+    fn new(simd: S, frames: &Frames<S>) -> Self {
+        let [x, y, z] = frames.direction;
+        let size = [simd.abs(x), simd.abs(y), simd.abs(z)];
+        let greatest = simd.max(simd.max(size[1], size[2]), size[0]);
+        let sizes = [size[0], greatest, size[1], size[2]];
+        let [axes, origin, direction] = [
+            in_order(simd, sizes, [bits(simd, 0), bits(simd, 1), bits(simd, 2)]),
+            in_order(simd, sizes, frames.origin),
+            in_order(simd, sizes, frames.direction),
+        ];
+        let steepness = choose(simd, sizes, frames.inverse);
+        let shear = [simd.mul(direction[0], steepness), simd.mul(direction[1], steepness)];
+        Self { axes, origin, depth: direction[2], steepness, shear }
+    }
+}
+
+/// In the order of the axes of the sheared space.
 #[inline(always)]
-fn shear<S: Simd>(simd: S, direction: [S::F32; 3], inverse: [S::F32; 3]) -> ([S::F32; 3], [S::F32; 2]) {
-    let [x, y, z] = direction;
-    let size = [simd.abs(x), simd.abs(y), simd.abs(z)];
-    let greatest = simd.max(simd.max(size[1], size[2]), size[0]);
-    let sizes = [size[0], greatest, size[1], size[2]];
-    let (zero, one, two) = (bits(simd, 0), bits(simd, 1), bits(simd, 2));
-    let axes = [
-        choose(simd, sizes, [one, two, zero]),
-        choose(simd, sizes, [two, zero, one]),
-        choose(simd, sizes, [zero, one, two]),
-    ];
-    let steepness = choose(simd, sizes, inverse);
-    let shear = [choose(simd, sizes, [y, z, x]), choose(simd, sizes, [z, x, y])];
-    (axes, [simd.mul(shear[0], steepness), simd.mul(shear[1], steepness)])
+fn in_order<S: Simd>(simd: S, sizes: [S::F32; 4], [x, y, z]: [S::F32; 3]) -> [S::F32; 3] {
+    [choose(simd, sizes, [y, z, x]), choose(simd, sizes, [z, x, y]), choose(simd, sizes, [x, y, z])]
 }
 
 /// The first where the size of x is the greatest, else the second where that of y is at least that of z, else the third.

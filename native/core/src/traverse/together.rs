@@ -5,16 +5,18 @@ use std::time::Instant;
 
 use super::{
     Tracer,
-    answers::Answers,
+    answers::{self, Answer},
     batch::Room,
     frame::Domain,
     pace::{Pace, Trial},
     packet,
-    stream::{self, BIN},
+    stream::{self, Bin, bin_size},
     tile::{self, EXTENTS},
+    waiting::Waiting,
 };
 use crate::{
     Error,
+    mesh::Reader,
     ray::{Eight, Hit, HitsMut, MISS, Rays},
     simd::{Kernel, Simd},
     triangle::LANES,
@@ -138,9 +140,9 @@ impl<'a, T: Take + ?Sized, const ANY: bool> Together<'a, T, ANY> {
         let Tracer { structure, mesh, .. } = self.tracer;
         let octants = self.room.waiting.sort();
         for (octant, places) in octants.into_iter().enumerate() {
-            for first in places.clone().step_by(BIN) {
+            for first in places.clone().step_by(bin_size()) {
                 let Room { stack, bin, lists, waiting, .. } = &mut *self.room;
-                bin.fill(simd, waiting, first..places.end.min(first + BIN), &structure.domain)?;
+                bin.fill(simd, waiting, first..places.end.min(first + bin_size()), &structure.domain)?;
                 stream::trace::<S, GRIDS, ANY>(simd, structure, mesh, octant, bin, lists, stack);
                 self.answer(simd);
             }
@@ -207,22 +209,42 @@ impl<'a, T: Take + ?Sized, const ANY: bool> Together<'a, T, ANY> {
             return;
         }
         bin.warm(simd, self.tracer.mesh);
-        let (mut answers, mut slot) = (Answers::EMPTY, 0);
-        while slot < bin.len() {
-            while slot < bin.len() && !answers.is_full() {
-                let (place, frame, best) = bin.ray(slot);
-                if best.primitive == MISS {
-                    self.to.take(waiting.index(place), Hit::MISS);
-                } else {
-                    answers.push(slot, frame, mesh, best.primitive);
-                }
-                slot += 1;
+        let nobody = Answer { slot: 0, frame: bin.ray(0).1, primitive: MISS };
+        let (mut answers, mut count) = ([nobody; answers::RAYS], 0);
+        for slot in 0..bin.len() {
+            let (place, frame, best) = bin.ray(slot);
+            if best.primitive == MISS {
+                self.to.take(waiting.index(place), Hit::MISS);
+                continue;
             }
-            let (hits, count) = answers.take(simd);
-            for &(slot, hit) in &hits[..count] {
-                let (place, frame, _) = bin.ray(slot);
-                self.to.take(waiting.index(place), frame.in_ray_units(hit));
+            answers[count] = Answer { slot, frame, primitive: best.primitive };
+            count += 1;
+            if count == answers::RAYS {
+                Self::tell(simd, waiting, bin, &answers, mesh, self.to);
+                count = 0;
             }
+        }
+        if count != 0 {
+            let first = answers[0];
+            answers[count..].fill(first);
+            Self::tell(simd, waiting, bin, &answers, mesh, self.to);
+        }
+    }
+
+    /// Tell what rays that hit something hit; some may be told twice.
+    #[inline(always)]
+    fn tell<S: Simd>(
+        simd: S,
+        waiting: &Waiting,
+        bin: &Bin,
+        answers: &[Answer<'_>; answers::RAYS],
+        mesh: Reader<'_>,
+        to: &mut T,
+    ) {
+        let hits = answers::evaluate(simd, answers, mesh);
+        for lane in 0..answers::RAYS {
+            let (place, frame, _) = bin.ray(answers[lane].slot);
+            to.take(waiting.index(place), frame.in_ray_units(hits[lane]));
         }
     }
 }

@@ -7,7 +7,10 @@ use std::ops::Range;
 
 use glam::Vec3;
 
-use super::frame::{Domain, Frame};
+use super::{
+    frame::{Domain, Frame},
+    stream::bin_size,
+};
 use crate::{
     Error,
     ray::{Ray, Rays},
@@ -15,12 +18,16 @@ use crate::{
     triangle::LANES,
 };
 
-/// The most rays that wait: their numbers fit into 16 bits. Of 8 to 64 thousand, with AVX2 and rays in the order of
-/// pixels, none was the fastest everywhere, and 64 thousand cost up to 15% (ambient occlusion on the dragon).
+/// The most rays that wait: eight bins, but at least so many. Their numbers fit into 16 bits. Of 8 to 64 thousand, with
+/// 512 KiB of second-level cache and rays in the order of pixels, none was the fastest everywhere, and 64 thousand cost
+/// up to 15% (ambient occlusion on the dragon).
 ///
 /// Against bins of an octant in the order in which rays came, half a million bounces from random triangles took 1/1.20
 /// of the time on the dragon and 1/1.14 on the soup. Rays in the order of pixels gain nothing from the cells.
-pub const MOST: usize = 1 << 14;
+pub fn most() -> usize {
+    const LEAST: usize = 1 << 14;
+    (8 * bin_size()).max(LEAST)
+}
 
 /// Room that [`Waiting::add`] needs: up to eight rays, and eight places written for each.
 const SPARE: usize = 2 * LANES;
@@ -48,7 +55,7 @@ pub struct Waiting {
 impl Waiting {
     /// Forget all rays; there is room then for as many as wait at once in a batch of that size.
     pub fn begin(&mut self, batch: usize) {
-        let room = (batch + SPARE).min(MOST);
+        let room = (batch + SPARE).min(most());
         if self.rows.len() < room {
             self.rows.resize(room, [0.0; 8]);
             self.keys.resize(room, 0);
@@ -256,7 +263,7 @@ mod tests {
 
     #[test]
     fn every_ray_is_in_the_part_of_its_octant_once() {
-        for count in [1, 8, 77, 5000, MOST - SPARE] {
+        for count in [1, 8, 77, 5000, most() - SPARE] {
             let columns = columns(count);
             for level in Level::available() {
                 let mut waiting = Waiting::default();
@@ -278,14 +285,14 @@ mod tests {
 
     #[test]
     fn neighbours_in_the_order_begin_near_each_other() {
-        let columns = columns(MOST - SPARE);
+        let columns = columns(most() - SPARE);
         let mut waiting = Waiting::default();
         Level::detect().run(Add(&mut waiting, &rays(&columns))).unwrap();
         let origin = |ray: usize| Vec3::new(columns[0][ray], columns[1][ray], columns[2][ray]);
         let apart = |pairs: &mut dyn Iterator<Item = (usize, usize)>| -> f32 {
             pairs.map(|(one, two)| origin(one).distance(origin(two))).sum()
         };
-        let as_they_came = apart(&mut (1..MOST - SPARE).map(|ray| (ray - 1, ray)));
+        let as_they_came = apart(&mut (1..most() - SPARE).map(|ray| (ray - 1, ray)));
         let parts = waiting.sort().into_iter().filter(|places| !places.is_empty());
         let mut pairs = parts.flat_map(|places| {
             (places.start + 1..places.end).map(|place| (waiting.index(place - 1), waiting.index(place)))

@@ -6,10 +6,14 @@
 //! Every ray keeps its own interval, boxes and triangles are tested by the arithmetic of the single ray, and the first
 //! hit in the order of [`Hit::precedes`] does not depend on the order of tests: results equal the single ray's.
 
-use std::ops::Range;
+mod leaf;
+mod rays;
+
+use std::{ops::Range, sync::LazyLock};
 
 use bytemuck::Zeroable;
 
+use self::{leaf::Leaf, rays::Standing};
 use super::{
     frame::{Domain, Frame},
     kernel,
@@ -21,14 +25,23 @@ use super::{
 use crate::{
     Error, Mesh,
     accel::structure::{Node, NodeRef, Structure, Target, View},
+    cache,
     ray::MISS,
     simd::{MOST_GROUP, Simd},
-    triangle::{Block, LANES},
+    triangle::LANES,
 };
 
-/// Rays that walk together: their frames take 128 KiB of the second-level cache. Measured with AVX2 over parts of 8 to
-/// 64 thousand rays: 4096 at once were 8% faster on soups, but up to 10% slower on surfaces.
-pub const BIN: usize = 1024;
+/// The least and the most rays that walk together.
+const SIZES: [usize; 2] = [1 << 10, 1 << 12];
+
+/// Rays that walk together: as many as have frames in a quarter of the second-level cache. With 2 MiB of it 4096 took
+/// 1/1.05 of the time of 1024, on the dragon and in Sponza 1/1.08, and 8192 as long; with 512 KiB 4096 took up to 1.1
+/// times as long on surfaces.
+pub fn bin_size() -> usize {
+    static SIZE: LazyLock<usize> =
+        LazyLock::new(|| (cache::second_level() / 4 / size_of::<Frame>()).clamp(SIZES[0], SIZES[1]));
+    *SIZE
+}
 
 /// Fewer rays than this go on one by one from where they are; from 1 to 5, times differed by less than the noise on the
 /// bunny and by up to 8% on the dragon, where waiting rays give the next nodes time to arrive.
@@ -38,12 +51,12 @@ const FEW: usize = 2;
 #[derive(Debug, Default)]
 pub struct Bin {
     frames: Vec<Frame>,
-    hits: Vec<Best>,
+    hits: Vec<Standing>,
     places: Range<usize>,
 }
 
 impl Bin {
-    /// Take the rays of some places in the order of those that wait, at most [`BIN`].
+    /// Take the rays of some places in the order of those that wait, at most [`bin_size`].
     ///
     /// # Errors
     /// [`Error::Ray`] for an unusable ray.
@@ -55,7 +68,7 @@ impl Bin {
         places: Range<usize>,
         domain: &Domain,
     ) -> Result<(), Error> {
-        self.frames.resize(BIN, Frame::zeroed());
+        self.frames.resize(bin_size(), Frame::zeroed());
         self.hits.clear();
         let (groups, _) = self.frames.as_chunks_mut();
         for (first, frames) in places.clone().step_by(LANES).zip(groups) {
@@ -68,7 +81,7 @@ impl Bin {
                 }
             }
             for frame in frames {
-                self.hits.push(Best::none(frame.tmax));
+                self.hits.push(Standing::begin(frame));
             }
         }
         self.places = places;
@@ -84,14 +97,14 @@ impl Bin {
     /// Place, frame and first hit of a ray.
     #[inline(always)]
     pub fn ray(&self, slot: usize) -> (usize, &Frame, Best) {
-        (self.places.start + slot, &self.frames[slot], self.hits[slot])
+        (self.places.start + slot, &self.frames[slot], self.hits[slot].best())
     }
 
     /// Ask for the triangles that were hit, so that they are near when their hits are evaluated.
     #[inline(always)]
     pub fn warm<S: Simd>(&self, simd: S, mesh: &Mesh) {
         let (triangles, vertices) = (mesh.triangles(), mesh.vertices());
-        let hits = self.hits[..self.len()].iter().filter(|best| best.primitive != MISS);
+        let hits = self.hits[..self.len()].iter().map(Standing::best).filter(|best| best.primitive != MISS);
         for best in hits.clone() {
             simd.prefetch(&triangles[best.primitive as usize]);
         }
@@ -116,6 +129,7 @@ pub struct Lists {
     visits: Vec<Visit>,
     ids: Vec<u16>,
     masks: Vec<u8>,
+    leaf: Box<leaf::Memory>,
 }
 
 /// Trace all rays of a bin; `octant` is theirs.
@@ -158,15 +172,14 @@ pub fn trace<S: Simd, const GRIDS: bool, const ANY: bool>(
             }
             Target::Leaf { block, count } => {
                 let block = &here.blocks[block as usize];
-                for &id in &lists.ids[ids] {
-                    let ray = Single { frame: &mut bin.frames[id as usize], best: &mut bin.hits[id as usize] };
-                    ray.block::<S, ANY>(simd, mesh, block, count);
+                let leaf = Leaf { mesh, block, count };
+                for &id in leaf.test::<S, ANY>(simd, &lists.ids[ids], bin, &mut lists.leaf) {
+                    Single { bin, id: id as usize }.block::<S, ANY>(simd, &leaf);
                 }
             }
             _ => {
                 for &id in &lists.ids[ids] {
-                    let ray = Single { frame: &mut bin.frames[id as usize], best: &mut bin.hits[id as usize] };
-                    ray.trace::<S, GRIDS, ANY>(simd, structure, mesh, (here, node), stack);
+                    Single { bin, id: id as usize }.trace::<S, GRIDS, ANY>(simd, structure, mesh, (here, node), stack);
                 }
             }
         }
@@ -235,8 +248,8 @@ fn branch<S: Simd, const ANY: bool>(
 
 impl Lists {
     fn begin(&mut self, root: NodeRef, count: usize) {
-        self.masks.resize((BIN + LANES).next_multiple_of(MOST_GROUP), 0);
-        self.make_room(2 * BIN);
+        self.masks.resize((bin_size() + LANES).next_multiple_of(MOST_GROUP), 0);
+        self.make_room(2 * bin_size());
         for (id, slot) in self.ids[..count].iter_mut().enumerate() {
             *slot = id as u16;
         }
@@ -282,24 +295,35 @@ impl<S: Simd> OctantPlanes<S> {
     }
 }
 
+impl Bin {
+    /// Nothing beyond the best hit of a ray is of interest any more; where any hit will do, nothing at all.
+    #[inline(always)]
+    fn keep<const ANY: bool>(&mut self, id: usize, best: Best) {
+        let best = if ANY && best.primitive != MISS { Best { high: f32::NEG_INFINITY, ..best } } else { best };
+        self.hits[id].set(best);
+        self.frames[id].tmax = best.high;
+    }
+}
+
 /// One ray of a bin.
 struct Single<'a> {
-    frame: &'a mut Frame,
-    best: &'a mut Best,
+    bin: &'a mut Bin,
+    id: usize,
 }
 
 impl Single<'_> {
     /// Test a block.
     #[inline(always)]
-    fn block<S: Simd, const ANY: bool>(self, simd: S, mesh: &Mesh, block: &Block, count: u32) {
-        if self.frame.tmin > self.frame.tmax {
+    fn block<S: Simd, const ANY: bool>(self, simd: S, &Leaf { mesh, block, count }: &Leaf<'_>) {
+        let frame = &self.bin.frames[self.id];
+        if frame.tmin > frame.tmax {
             return;
         }
         let mut silent = Silent;
-        let mut search = Search::new(simd, self.frame, mesh, &mut silent, *self.best);
+        let mut search = Search::new(simd, frame, mesh, &mut silent, self.bin.hits[self.id].best());
         search.block::<ANY>(block, count);
         let best = search.best;
-        self.keep::<ANY>(best);
+        self.bin.keep::<ANY>(self.id, best);
     }
 
     /// Go on alone below a node.
@@ -312,20 +336,14 @@ impl Single<'_> {
         node: (View<'_>, NodeRef),
         stack: &mut [kernel::Entry],
     ) {
-        if self.frame.tmin > self.frame.tmax {
+        let frame = &self.bin.frames[self.id];
+        if frame.tmin > frame.tmax {
             return;
         }
         let mut silent = Silent;
-        let mut search = Search::new(simd, self.frame, mesh, &mut silent, *self.best);
+        let mut search = Search::new(simd, frame, mesh, &mut silent, self.bin.hits[self.id].best());
         kernel::trace_below::<S, Silent, GRIDS, ANY>(&mut search, structure, node, stack);
         let best = search.best;
-        self.keep::<ANY>(best);
-    }
-
-    /// Nothing beyond the best hit is of interest any more; where any hit will do, nothing at all.
-    #[inline(always)]
-    fn keep<const ANY: bool>(self, best: Best) {
-        *self.best = best;
-        self.frame.tmax = if ANY && best.primitive != MISS { f32::NEG_INFINITY } else { best.high };
+        self.bin.keep::<ANY>(self.id, best);
     }
 }

@@ -1,4 +1,4 @@
-//! Packets where single precision decides nothing: rays from planes, through edges and corners, that end at a hit to
+//! Packets and streams where single precision decides nothing: rays from planes, through edges and corners, that end at a hit to
 //! the bit, among triangles long, tiny, huge and flat, near the origin and far from it. Against brute force.
 
 mod common;
@@ -82,28 +82,26 @@ fn ending(rays: &RayBatch, hits: &Hits, case: usize) -> RayBatch {
 }
 
 fn agree(mesh: &Arc<Mesh>, rays: &RayBatch, expected: &Hits, what: &str) {
-    let expected: Vec<bool> = expected.primitive.iter().map(|primitive| *primitive != MISS).collect();
+    let blocked: Vec<bool> = expected.primitive.iter().map(|primitive| *primitive != MISS).collect();
     for method in [Method::BvhSah, Method::Grid, Method::Lbvh] {
         for level in Level::available() {
             let built = Accelerator::build(mesh.clone(), method, &Config::default(), 2, &Job::new()).unwrap();
-            let mut blocked = vec![false; rays.len()];
-            built.with_level(level).tracer().occluded_in_packets(&rays.rays(), &mut blocked).unwrap();
+            let accelerator = built.with_level(level);
+            let mut in_packets = vec![false; rays.len()];
+            accelerator.tracer().occluded_in_packets(&rays.rays(), &mut in_packets).unwrap();
+            let (hits, in_streams) = (closest(&accelerator, rays), occluded(&accelerator, rays));
             for index in 0..rays.len() {
-                let ray = rays.ray(index);
-                assert_eq!(
-                    blocked[index],
-                    expected[index],
-                    "{index} {ray:?} {what} {} {}",
-                    method.name(),
-                    level.name()
-                );
+                let case = format!("{index} {:?} {what} {} {}", rays.ray(index), method.name(), level.name());
+                assert_eq!(in_packets[index], blocked[index], "{case}");
+                assert_eq!(in_streams[index], blocked[index], "{case}");
+                assert_eq!(hits.get(index), expected.get(index), "{case}");
             }
         }
     }
 }
 
 #[test]
-fn packets_say_what_the_exact_test_says() {
+fn packets_and_streams_say_what_the_exact_test_says() {
     let numbers = &mut Numbers(11);
     for (centre, scale) in [(Vec3::ZERO, 1.0), (Vec3::new(900.0, -3e4, 7.0), 3.0), (Vec3::ONE, 1e-4), (Vec3::ZERO, 1e8)]
     {
