@@ -214,19 +214,29 @@ fn branch<S: Simd, const ANY: bool>(
     let (start, mut end) = (ids.start, ids.start + padded);
     lists.make_room(end + LANES * padded);
     let planes = OctantPlanes::new(simd, node, octant);
-    // Eight masks are written at once: read eightfold soon after, single bytes would have to be waited for.
+    // Eight masks are written at once: read eightfold soon after, single bytes would have to be waited for. All groups but
+    // the last are eight rays, and their loop is unrolled.
     let mut any = 0;
     lists.masks[ids.len().next_multiple_of(LANES)..padded].fill(0);
     let (masks, _) = lists.masks.as_chunks_mut();
-    for (masks, ids) in masks.iter_mut().zip(lists.ids[ids].chunks(LANES)) {
-        let mut word = 0;
-        for (lane, &id) in ids.iter().enumerate() {
-            let met = planes.meet(simd, &frames[id as usize]);
-            word |= u64::from(met) << (8 * lane);
-            any |= met;
-        }
-        *masks = word.to_le_bytes();
+    let (eights, rest) = lists.ids[ids].as_chunks::<LANES>();
+    for (masks, eight) in masks.iter_mut().zip(eights) {
+        let met = planes.meet_by_eight(simd, frames, eight);
+        any |= met;
+        *masks = met.to_le_bytes();
     }
+    if !rest.is_empty() {
+        let mut met = 0;
+        for (lane, &id) in rest.iter().enumerate() {
+            met |= u64::from(planes.meet(simd, &frames[usize::from(id)])) << (8 * lane);
+        }
+        any |= met;
+        masks[eights.len()] = met.to_le_bytes();
+    }
+    any |= any >> 32;
+    any |= any >> 16;
+    any |= any >> 8;
+    let any = any as u32 & 0xff;
     let leaves = if ANY { node.leaves() } else { 0 };
     for mut rest in [any & !leaves, any & leaves] {
         let mut order = node.order[octant];
@@ -280,6 +290,16 @@ impl<S: Simd> OctantPlanes<S> {
             far[k] = simd.load(&node.plane[k + 3 - side]);
         }
         Self { near, far }
+    }
+
+    /// The children that eight rays meet within their intervals, a byte for each ray.
+    #[inline(always)]
+    fn meet_by_eight(&self, simd: S, frames: &[Frame], ids: &[u16; LANES]) -> u64 {
+        let mut met = 0;
+        for lane in 0..LANES {
+            met |= u64::from(self.meet(simd, &frames[usize::from(ids[lane])])) << (8 * lane);
+        }
+        met
     }
 
     /// The children that a ray meets within its interval.
