@@ -60,20 +60,21 @@ impl<S: Simd> Sheared<S> {
     /// A block's triangles before one ray.
     #[inline(always)]
     pub fn of_block(simd: S, frame: &Frame, block: &Block) -> Self {
-        let origin = [simd.splat(frame.origin[0]), simd.splat(frame.origin[1]), simd.splat(frame.origin[2])];
-        let shear = [simd.splat(frame.shear[0]), simd.splat(frame.shear[1])];
-        let a = in_order(simd, frame, &block.corner[0]);
-        let b = in_order(simd, frame, &block.corner[1]);
-        let c = in_order(simd, frame, &block.corner[2]);
-        Self::new(simd, [a, b, c], origin, shear)
+        let a = sheared(simd, frame, &block.corner[0]);
+        let b = sheared(simd, frame, &block.corner[1]);
+        let c = sheared(simd, frame, &block.corner[2]);
+        Self::of_corners(simd, [a, b, c])
     }
 }
 
-/// Corners in the order of a ray's axes.
+/// Corners of a block in the sheared space of a ray.
 #[inline(always)]
-fn in_order<S: Simd>(simd: S, frame: &Frame, corner: &[[f32; LANES]; 3]) -> [S::F32; 3] {
+fn sheared<S: Simd>(simd: S, frame: &Frame, corner: &[[f32; LANES]; 3]) -> [S::F32; 3] {
     let [x, y, z] = frame.axes;
-    [simd.load(&corner[x as usize]), simd.load(&corner[y as usize]), simd.load(&corner[z as usize])]
+    let x = simd.sub(simd.load(&corner[x as usize]), simd.splat(frame.origin[0]));
+    let y = simd.sub(simd.load(&corner[y as usize]), simd.splat(frame.origin[1]));
+    let z = simd.sub(simd.load(&corner[z as usize]), simd.splat(frame.origin[2]));
+    shear(simd, [x, y, z], [simd.splat(frame.shear[0]), simd.splat(frame.shear[1])])
 }
 
 impl<S: Arithmetic> Sheared<S> {
@@ -81,9 +82,14 @@ impl<S: Arithmetic> Sheared<S> {
     /// origins are in the order of the rays' axes.
     #[inline(always)]
     pub fn new(simd: S, [a, b, c]: [[S::F32; 3]; 3], origin: [S::F32; 3], shears: [S::F32; 2]) -> Self {
-        let a = shear(simd, a, origin, shears);
-        let b = shear(simd, b, origin, shears);
-        let c = shear(simd, c, origin, shears);
+        let a = shear(simd, relative(simd, a, origin), shears);
+        let b = shear(simd, relative(simd, b, origin), shears);
+        let c = shear(simd, relative(simd, c, origin), shears);
+        Self::of_corners(simd, [a, b, c])
+    }
+
+    #[inline(always)]
+    fn of_corners(simd: S, [a, b, c]: [[S::F32; 3]; 3]) -> Self {
         let (u, v, w) = (edge(simd, c, b), edge(simd, a, c), edge(simd, b, a));
         Self { depth: [a[2], b[2], c[2]], edge: [u.0, v.0, w.0], product: [u.1, v.1, w.1] }
     }
@@ -154,11 +160,15 @@ impl<S: Arithmetic> Sheared<S> {
 
 /// Corners in sheared space, rounded as in the exact test.
 #[inline(always)]
-fn shear<S: Arithmetic>(simd: S, corner: [S::F32; 3], origin: [S::F32; 3], shear: [S::F32; 2]) -> [S::F32; 3] {
-    let z = simd.sub(corner[2], origin[2]);
-    let x = simd.sub(simd.sub(corner[0], origin[0]), simd.mul(shear[0], z));
-    let y = simd.sub(simd.sub(corner[1], origin[1]), simd.mul(shear[1], z));
+fn shear<S: Arithmetic>(simd: S, [x, y, z]: [S::F32; 3], shear: [S::F32; 2]) -> [S::F32; 3] {
+    let x = simd.sub(x, simd.mul(shear[0], z));
+    let y = simd.sub(y, simd.mul(shear[1], z));
     [x, y, z]
+}
+
+#[inline(always)]
+fn relative<S: Arithmetic>(simd: S, corner: [S::F32; 3], origin: [S::F32; 3]) -> [S::F32; 3] {
+    [simd.sub(corner[0], origin[0]), simd.sub(corner[1], origin[1]), simd.sub(corner[2], origin[2])]
 }
 
 /// Twice the signed areas of the triangles of the origin, `p` and `q`, and the products they come from that are
