@@ -35,8 +35,8 @@ use crate::{
 const SIZES: [usize; 2] = [1 << 10, 1 << 12];
 
 /// Rays that walk together, a power of two: as many as have frames in a quarter of the second-level cache. With 2 MiB of
-/// it 4096 took 1/1.05 of the time of 1024, on the dragon and in Sponza 1/1.08, and 8192 as long; with 512 KiB 4096 took
-/// up to 1.1 times as long on surfaces.
+/// it 4096 took 1/1.05 of the time of 1024 (the dragon 1/1.06, Sponza 1/1.13, the room 1.01 times), and 8192 as long as
+/// 4096; with 512 KiB 4096 took up to 1.1 times as long on surfaces.
 pub fn bin_size() -> usize {
     static SIZE: LazyLock<usize> = LazyLock::new(|| {
         let fitting = cache::second_level() / 4 / size_of::<Frame>();
