@@ -9,6 +9,7 @@ use crate::{
     arena::Arena,
     bounds::{Bounds, BoundsA},
     pool,
+    simd::Simd,
 };
 
 /// No coordinate may exceed this magnitude: squares of coordinates must stay finite in single precision.
@@ -198,6 +199,19 @@ impl<'a> Reader<'a> {
     pub fn rows(&self, triangle: u32) -> [&'a [f32; 4]; 3] {
         let [a, b, c] = self.triangles[triangle as usize];
         [self.numbers(a), self.numbers(b), self.numbers(c)]
+    }
+
+    /// Ask for the indices of a triangle's vertices.
+    #[inline(always)]
+    pub fn warm_triangle<S: Simd>(&self, simd: S, triangle: u32) {
+        simd.prefetch(&self.triangles[triangle as usize]);
+    }
+
+    /// Ask for the corners of a triangle.
+    #[inline(always)]
+    pub fn warm_corners<S: Simd>(&self, simd: S, triangle: u32) {
+        let [a, ..] = self.rows(triangle);
+        simd.prefetch(a);
     }
 
     #[inline(always)]

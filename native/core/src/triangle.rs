@@ -64,7 +64,7 @@ impl Block {
         for k in 0..3 {
             let axis = frame.axes[k] as usize;
             for c in 0..3 {
-                relative[c][k] = self.corner[c][axis][lane] - frame.origin[k];
+                relative[c][k] = self.corner[c][axis][lane] - frame.origin[axis];
             }
         }
         relative
@@ -101,7 +101,7 @@ pub fn relative(frame: &Frame, corners: [&[f32; 3]; 3]) -> [[f32; 3]; 3] {
     for k in 0..3 {
         let axis = frame.axes[k] as usize;
         for c in 0..3 {
-            relative[c][k] = corners[c][axis] - frame.origin[k];
+            relative[c][k] = corners[c][axis] - frame.origin[axis];
         }
     }
     relative
@@ -115,13 +115,16 @@ pub fn evaluate(frame: &Frame, relative: [[f32; 3]; 3], primitive: u32) -> Hit {
     weigh(frame, [edge(c, b), edge(a, c), edge(b, a)], [a[2], b[2], c[2]], primitive)
 }
 
-/// The parameter and the weights, evaluated in double precision and rounded once.
+/// The parameter and the weights, evaluated in double precision and rounded to single. With one division: three took
+/// a tenth of the time of a picture's cheapest rays.
 #[inline(always)]
 fn weigh(frame: &Frame, [u, v, w]: [f64; 3], [a, b, c]: [f64; 3], primitive: u32) -> Hit {
     let determinant = u + v + w;
     let depth = f64::from(frame.depth);
-    let t = ((u * a + v * b + w * c) / (determinant * depth)) as f32;
-    Hit { t, primitive, u: (v / determinant) as f32, v: (w / determinant) as f32 }
+    let per_length = 1.0 / (determinant * depth);
+    let share = per_length * depth;
+    let t = (u * a + v * b + w * c) * per_length;
+    Hit { t: t as f32, primitive, u: (v * share) as f32, v: (w * share) as f32 }
 }
 
 #[inline(always)]

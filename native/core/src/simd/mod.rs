@@ -67,8 +67,6 @@ pub trait Arithmetic: Copy + Send + Sync + 'static {
     fn straddles_zero(self, a: Self::F32, b: Self::F32) -> u32;
     /// The first in the lanes whose bits are set, else the second.
     fn select(self, lanes: u32, first: Self::F32, second: Self::F32) -> Self::F32;
-    /// In every lane the number of the row that the lowest two bits of `index` say.
-    fn pick(self, row: &[f32; 4], index: Self::F32) -> Self::F32;
     /// The magnitude of each.
     #[inline(always)]
     fn abs(self, value: Self::F32) -> Self::F32 {
@@ -121,8 +119,8 @@ pub trait Simd: Arithmetic {
     fn sub_f64(self, a: Self::F64, b: Self::F64) -> Self::F64;
     /// a * b, rounded once
     fn mul_f64(self, a: Self::F64, b: Self::F64) -> Self::F64;
-    /// a / b, rounded once
-    fn div_f64(self, a: Self::F64, b: Self::F64) -> Self::F64;
+    /// 1 / a, rounded once
+    fn reciprocal_f64(self, a: Self::F64) -> Self::F64;
     /// Bit `i` is set where lane `i` is above zero.
     fn positive_f64(self, value: Self::F64) -> u32;
     /// Bit `i` is set where lane `i` is below zero.

@@ -154,16 +154,6 @@ impl Arithmetic for Neon {
         let bits = unsafe { [vld1q_u32(WEIGHTS.as_ptr()), vld1q_u32(WEIGHTS[4..].as_ptr())] };
         halves!(bits, first, second => vbslq_f32(vtstq_u32(vdupq_n_u32(lanes), bits), first, second))
     }
-    #[inline(always)]
-    fn pick(self, row: &[f32; 4], index: Pair) -> Pair {
-        // SAFETY: as for `splat`; the array has four readable numbers.
-        let row = unsafe { vreinterpretq_u8_f32(vld1q_f32(row.as_ptr())) };
-        halves!(index => {
-            let index = vandq_u32(vreinterpretq_u32_f32(index), vdupq_n_u32(3));
-            let bytes = vaddq_u32(vmulq_u32(index, vdupq_n_u32(0x0404_0404)), vdupq_n_u32(0x0302_0100));
-            vreinterpretq_f32_u8(vqtbl1q_u8(row, vreinterpretq_u8_u32(bytes)))
-        })
-    }
 }
 
 impl Simd for Neon {
@@ -247,8 +237,10 @@ impl Simd for Neon {
         quarters!(a, b => vmulq_f64)
     }
     #[inline(always)]
-    fn div_f64(self, a: Quad, b: Quad) -> Quad {
-        quarters!(a, b => vdivq_f64)
+    fn reciprocal_f64(self, a: Quad) -> Quad {
+        // SAFETY: as for `splat`.
+        let one = [unsafe { vdupq_n_f64(1.0) }; 4];
+        quarters!(one, a => vdivq_f64)
     }
     #[inline(always)]
     fn positive_f64(self, value: Quad) -> u32 {

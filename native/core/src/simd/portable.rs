@@ -88,10 +88,6 @@ impl Arithmetic for Portable {
     fn select(self, lanes: u32, first: [f32; 8], second: [f32; 8]) -> [f32; 8] {
         std::array::from_fn(|i| if lanes >> i & 1 == 1 { first[i] } else { second[i] })
     }
-    #[inline(always)]
-    fn pick(self, row: &[f32; 4], index: [f32; 8]) -> [f32; 8] {
-        index.map(|index| row[index.to_bits() as usize & 3])
-    }
 }
 
 impl Simd for Portable {
@@ -161,8 +157,8 @@ impl Simd for Portable {
         zip(a, b, |a, b| a * b)
     }
     #[inline(always)]
-    fn div_f64(self, a: [f64; 8], b: [f64; 8]) -> [f64; 8] {
-        zip(a, b, |a, b| a / b)
+    fn reciprocal_f64(self, a: [f64; 8]) -> [f64; 8] {
+        a.map(|a| 1.0 / a)
     }
     #[inline(always)]
     fn positive_f64(self, value: [f64; 8]) -> u32 {

@@ -78,10 +78,6 @@ impl<S: Simd> Arithmetic for Twice<S> {
     fn select(self, lanes: u32, first: Self::F32, second: Self::F32) -> Self::F32 {
         [self.0.select(lanes, first[0], second[0]), self.0.select(lanes >> 8, first[1], second[1])]
     }
-    #[inline(always)]
-    fn pick(self, row: &[f32; 4], index: Self::F32) -> Self::F32 {
-        [self.0.pick(row, index[0]), self.0.pick(row, index[1])]
-    }
 }
 
 /// The first and the last eight of sixteen numbers.

@@ -109,12 +109,4 @@ impl Arithmetic for Zmm {
         // SAFETY: as for `splat`.
         unsafe { _mm512_mask_blend_ps(lanes as u16, second, first) }
     }
-    #[inline(always)]
-    fn pick(self, row: &[f32; 4], index: __m512) -> __m512 {
-        // SAFETY: as for `splat`; the reference is to 16 readable bytes and the load asks for no alignment.
-        unsafe {
-            let row = _mm512_broadcast_f32x4(_mm_loadu_ps(row.as_ptr()));
-            _mm512_permutevar_ps(row, _mm512_castps_si512(index))
-        }
-    }
 }

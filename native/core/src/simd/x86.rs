@@ -115,14 +115,6 @@ macro_rules! arithmetic {
             unsafe { _mm256_xor_ps(a, b) }
         }
         #[inline(always)]
-        fn pick(self, row: &[f32; 4], index: __m256) -> __m256 {
-            // SAFETY: as for `splat`; the reference is to 16 readable bytes and the load asks for no alignment.
-            unsafe {
-                let row = _mm_loadu_ps(row.as_ptr());
-                _mm256_permutevar_ps(_mm256_set_m128(row, row), _mm256_castps_si256(index))
-            }
-        }
-        #[inline(always)]
         fn sub_bits(self, a: __m256, b: __m256) -> __m256 {
             // SAFETY: a token exists only where AVX2 was detected.
             unsafe { _mm256_castsi256_ps(_mm256_sub_epi32(_mm256_castps_si256(a), _mm256_castps_si256(b))) }
@@ -225,9 +217,12 @@ macro_rules! vectors {
             unsafe { [_mm256_mul_pd(a[0], b[0]), _mm256_mul_pd(a[1], b[1])] }
         }
         #[inline(always)]
-        fn div_f64(self, a: [__m256d; 2], b: [__m256d; 2]) -> [__m256d; 2] {
+        fn reciprocal_f64(self, a: [__m256d; 2]) -> [__m256d; 2] {
             // SAFETY: as for `splat`.
-            unsafe { [_mm256_div_pd(a[0], b[0]), _mm256_div_pd(a[1], b[1])] }
+            unsafe {
+                let one = _mm256_set1_pd(1.0);
+                [_mm256_div_pd(one, a[0]), _mm256_div_pd(one, a[1])]
+            }
         }
         #[inline(always)]
         fn positive_f64(self, value: [__m256d; 2]) -> u32 {

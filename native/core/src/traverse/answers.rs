@@ -1,6 +1,10 @@
 //! The exact hits of rays whose triangle is known, sixteen at once.
 
-use super::{exact::Exact, frame::Frame};
+use super::{
+    crossing::{in_order, third_axis},
+    exact::Exact,
+    stream::Bin,
+};
 use crate::{
     mesh::Reader,
     ray::Hit,
@@ -11,35 +15,28 @@ use crate::{
 /// Rays that are evaluated at once.
 pub const RAYS: usize = 16;
 
-/// A ray, and the triangle that it is known to hit.
-#[derive(Clone, Copy)]
-pub struct Answer<'a> {
-    /// By whatever name the ray has.
-    pub slot: usize,
-    pub frame: &'a Frame,
-    pub primitive: u32,
-}
-
-/// The hits of sixteen rays, in their frames' units, to the bit those of [`triangle::evaluate`](crate::triangle::evaluate).
+/// The hits of sixteen rays of a bin, each of which hit something, in the rays' own units, to the bit those of
+/// [`triangle::evaluate`](crate::triangle::evaluate).
 #[inline(always)]
-pub fn evaluate<S: Simd>(simd: S, answers: &[Answer<'_>; RAYS], mesh: Reader<'_>) -> [Hit; RAYS] {
+pub fn evaluate<S: Simd>(simd: S, bin: &Bin, slots: &[usize; RAYS], mesh: Reader<'_>) -> [Hit; RAYS] {
     let wide = simd.wide();
-    let row: &[f32; 4] = &[0.0; 4];
+    let (shears, row) = (bin.shears(), &[0.0; 4]);
     let [mut a, mut b, mut c, mut first, mut second, mut third] = [[row; RAYS]; 6];
-    for (lane, answer) in answers.iter().enumerate() {
-        [a[lane], b[lane], c[lane]] = mesh.rows(answer.primitive);
-        [first[lane], second[lane], third[lane]] = answer.frame.sheared();
+    let mut hits = [Hit::MISS; RAYS];
+    for lane in 0..RAYS {
+        hits[lane].primitive = bin.best(slots[lane]).primitive;
+        [a[lane], b[lane], c[lane]] = mesh.rows(hits[lane].primitive);
+        [first[lane], second[lane], third[lane]] = shears[slots[lane]].rows();
     }
     let [x, y, z, _] = simd.columns(&first);
-    let [across, along, kx, ky] = simd.columns(&second);
-    let [kz, depth, ..] = simd.columns(&third);
-    let (origin, axes) = ([x, y, z], [kx, ky, kz]);
+    let [.., depth] = simd.columns(&second);
+    let [across, along, kx, ky] = simd.columns(&third);
+    let (origin, axes) = ([x, y, z], [kx, ky, third_axis(wide, kx, ky)]);
     let corners = [
         relative(wide, simd.columns(&a), axes, origin),
         relative(wide, simd.columns(&b), axes, origin),
         relative(wide, simd.columns(&c), axes, origin),
     ];
-    let mut hits = [Hit::MISS; RAYS];
     let (across, along, depth) = (simd.halves(across), simd.halves(along), simd.halves(depth));
     let corners = halves(simd, &corners);
     for half in 0..2 {
@@ -47,7 +44,8 @@ pub fn evaluate<S: Simd>(simd: S, answers: &[Answer<'_>; RAYS], mesh: Reader<'_>
         let (t, u, v) = (simd.store(exact.t), simd.store(exact.u), simd.store(exact.v));
         for lane in 0..LANES {
             let place = LANES * half + lane;
-            hits[place] = Hit { t: t[lane], primitive: answers[place].primitive, u: u[lane], v: v[lane] };
+            let t = shears[slots[place]].parameter(t[lane]);
+            hits[place] = Hit { t, u: u[lane], v: v[lane], ..hits[place] };
         }
     }
     hits
@@ -56,13 +54,8 @@ pub fn evaluate<S: Simd>(simd: S, answers: &[Answer<'_>; RAYS], mesh: Reader<'_>
 /// A corner relative to the origin, in the order of the axes.
 #[inline(always)]
 fn relative<W: Arithmetic>(wide: W, [x, y, z, _]: [W::F32; 4], axes: [W::F32; 3], origin: [W::F32; 3]) -> [W::F32; 3] {
-    let (one, two) = (wide.splat(f32::from_bits(1)), wide.splat(f32::from_bits(2)));
-    let mut relative = origin;
-    for k in 0..3 {
-        let place = wide.if_ge(axes[k], two, z, wide.if_ge(axes[k], one, y, x));
-        relative[k] = wide.sub(place, origin[k]);
-    }
-    relative
+    let [x, y, z] = [wide.sub(x, origin[0]), wide.sub(y, origin[1]), wide.sub(z, origin[2])];
+    in_order(wide, [x, y, z], axes)
 }
 
 #[inline(always)]

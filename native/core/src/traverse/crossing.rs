@@ -13,9 +13,9 @@
 //! twice as wide, which covers its own roundings and makes t lie strictly inside. Z is at least 1e-18, for underflow.
 //! Whatever overflows makes the interval's ends not a number, which nothing here takes for certain.
 
-use super::frame::Frame;
+use super::frame::Shears;
 use crate::{
-    simd::{Arithmetic, Simd},
+    simd::{Arithmetic, Simd, read_alone},
     triangle::{Block, LANES},
 };
 
@@ -35,15 +35,6 @@ pub struct Sheared<S: Arithmetic> {
     product: [S::F32; 3],
 }
 
-/// One triangle before sixteen rays, in memory.
-#[derive(Debug, Clone, Copy, Default)]
-#[repr(align(64))]
-pub struct Stored {
-    depth: [[f32; 16]; 3],
-    edge: [[f32; 16]; 3],
-    product: [[f32; 16]; 3],
-}
-
 /// Where rays cross triangles, if they do.
 pub struct Crossings<S: Arithmetic> {
     /// For every lane a parameter before the crossing.
@@ -59,32 +50,40 @@ pub struct Crossings<S: Arithmetic> {
 impl<S: Simd> Sheared<S> {
     /// A block's triangles before one ray.
     #[inline(always)]
-    pub fn of_block(simd: S, frame: &Frame, block: &Block) -> Self {
-        let a = sheared(simd, frame, &block.corner[0]);
-        let b = sheared(simd, frame, &block.corner[1]);
-        let c = sheared(simd, frame, &block.corner[2]);
+    pub fn of_block(simd: S, shears: &Shears, block: &Block) -> Self {
+        // Both would be read together with their neighbours.
+        let slopes = [simd.splat(read_alone(&shears.shear[0])), simd.splat(read_alone(&shears.shear[1]))];
+        let a = sheared(simd, shears, slopes, &block.corner[0]);
+        let b = sheared(simd, shears, slopes, &block.corner[1]);
+        let c = sheared(simd, shears, slopes, &block.corner[2]);
         Self::of_corners(simd, [a, b, c])
     }
 }
 
 /// Corners of a block in the sheared space of a ray.
 #[inline(always)]
-fn sheared<S: Simd>(simd: S, frame: &Frame, corner: &[[f32; LANES]; 3]) -> [S::F32; 3] {
-    let [x, y, z] = frame.axes;
-    let x = simd.sub(simd.load(&corner[x as usize]), simd.splat(frame.origin[0]));
-    let y = simd.sub(simd.load(&corner[y as usize]), simd.splat(frame.origin[1]));
-    let z = simd.sub(simd.load(&corner[z as usize]), simd.splat(frame.origin[2]));
-    shear(simd, [x, y, z], [simd.splat(frame.shear[0]), simd.splat(frame.shear[1])])
+fn sheared<S: Simd>(simd: S, shears: &Shears, slopes: [S::F32; 2], corner: &[[f32; LANES]; 3]) -> [S::F32; 3] {
+    let [x, y, z] = shears.axes;
+    let x = simd.sub(simd.load(&corner[x as usize]), simd.splat(shears.origin[x as usize]));
+    let y = simd.sub(simd.load(&corner[y as usize]), simd.splat(shears.origin[y as usize]));
+    let z = simd.sub(simd.load(&corner[z as usize]), simd.splat(shears.origin[z as usize]));
+    shear(simd, [x, y, z], slopes)
 }
 
 impl<S: Arithmetic> Sheared<S> {
-    /// Corners and edge functions, as the exact test has them before its arithmetic is in double precision; corners and
-    /// origins are in the order of the rays' axes.
+    /// A triangle's corners and edge functions, as the exact test has them before its arithmetic is in double precision;
+    /// axes are bits.
     #[inline(always)]
-    pub fn new(simd: S, [a, b, c]: [[S::F32; 3]; 3], origin: [S::F32; 3], shears: [S::F32; 2]) -> Self {
-        let a = shear(simd, relative(simd, a, origin), shears);
-        let b = shear(simd, relative(simd, b, origin), shears);
-        let c = shear(simd, relative(simd, c, origin), shears);
+    pub fn new(
+        simd: S,
+        [a, b, c]: [&[f32; 3]; 3],
+        origin: [S::F32; 3],
+        axes: [S::F32; 3],
+        shears: [S::F32; 2],
+    ) -> Self {
+        let a = shear(simd, relative(simd, a, origin, axes), shears);
+        let b = shear(simd, relative(simd, b, origin, axes), shears);
+        let c = shear(simd, relative(simd, c, origin, axes), shears);
         Self::of_corners(simd, [a, b, c])
     }
 
@@ -92,27 +91,6 @@ impl<S: Arithmetic> Sheared<S> {
     fn of_corners(simd: S, [a, b, c]: [[S::F32; 3]; 3]) -> Self {
         let (u, v, w) = (edge(simd, c, b), edge(simd, a, c), edge(simd, b, a));
         Self { depth: [a[2], b[2], c[2]], edge: [u.0, v.0, w.0], product: [u.1, v.1, w.1] }
-    }
-
-    /// Write down.
-    #[inline(always)]
-    pub fn store<W: Simd<Wide = S>>(&self, simd: W, to: &mut Stored) {
-        for k in 0..3 {
-            to.depth[k] = simd.store_wide(self.depth[k]);
-            to.edge[k] = simd.store_wide(self.edge[k]);
-            to.product[k] = simd.store_wide(self.product[k]);
-        }
-    }
-
-    /// Read what was written down.
-    #[inline(always)]
-    pub fn load<W: Simd<Wide = S>>(simd: W, from: &Stored) -> Self {
-        let Stored { depth, edge, product } = from;
-        Self {
-            depth: [simd.load_wide(&depth[0]), simd.load_wide(&depth[1]), simd.load_wide(&depth[2])],
-            edge: [simd.load_wide(&edge[0]), simd.load_wide(&edge[1]), simd.load_wide(&edge[2])],
-            product: [simd.load_wide(&product[0]), simd.load_wide(&product[1]), simd.load_wide(&product[2])],
-        }
     }
 
     /// The lanes in which two edge functions have opposite signs. Rounding is monotonic, so they have them exactly, too;
@@ -166,9 +144,30 @@ fn shear<S: Arithmetic>(simd: S, [x, y, z]: [S::F32; 3], shear: [S::F32; 2]) -> 
     [x, y, z]
 }
 
+/// A corner relative to the origins, in the order of the axes.
 #[inline(always)]
-fn relative<S: Arithmetic>(simd: S, corner: [S::F32; 3], origin: [S::F32; 3]) -> [S::F32; 3] {
-    [simd.sub(corner[0], origin[0]), simd.sub(corner[1], origin[1]), simd.sub(corner[2], origin[2])]
+fn relative<S: Arithmetic>(simd: S, [x, y, z]: &[f32; 3], origin: [S::F32; 3], axes: [S::F32; 3]) -> [S::F32; 3] {
+    let x = simd.sub(simd.splat(*x), origin[0]);
+    let y = simd.sub(simd.splat(*y), origin[1]);
+    let z = simd.sub(simd.splat(*z), origin[2]);
+    in_order(simd, [x, y, z], axes)
+}
+
+/// The last axis of three whose others are known; they are 0, 1 and 2, as bits.
+#[inline(always)]
+pub fn third_axis<S: Arithmetic>(simd: S, x: S::F32, y: S::F32) -> S::F32 {
+    simd.sub_bits(simd.sub_bits(simd.splat(f32::from_bits(3)), x), y)
+}
+
+/// The numbers of three axes in the order of others, which are bits.
+#[inline(always)]
+pub fn in_order<S: Arithmetic>(simd: S, [x, y, z]: [S::F32; 3], axes: [S::F32; 3]) -> [S::F32; 3] {
+    let (one, two) = (simd.splat(f32::from_bits(1)), simd.splat(f32::from_bits(2)));
+    let mut ordered = axes;
+    for k in 0..3 {
+        ordered[k] = simd.if_ge(axes[k], two, z, simd.if_ge(axes[k], one, y, x));
+    }
+    ordered
 }
 
 /// Twice the signed areas of the triangles of the origin, `p` and `q`, and the products they come from that are

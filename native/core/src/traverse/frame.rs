@@ -63,7 +63,7 @@ impl Domain {
     }
 }
 
-/// See the module's text. Two cache lines: what box tests read, then what triangle tests read.
+/// See the module's text. Two cache lines, [`Slabs`] and [`Shears`]: what box tests read, then what triangle tests read.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub struct Frame {
@@ -73,27 +73,100 @@ pub struct Frame {
     pub near_bias: [f32; 3],
     /// What is added to `plane * inverse` for the far planes of dilated boxes.
     pub far_bias: [f32; 3],
+    /// Origin relative to the centre of the domain.
+    pub local: [f32; 3],
     /// The interval, in the frame's own units.
     pub tmin: f32,
     /// The interval, in the frame's own units.
     pub tmax: f32,
-    /// Origin relative to the centre of the domain.
-    pub local: [f32; 3],
-    pub(super) advance: f64,
-    /// Origin of the triangle test, in the mesh's own coordinates but in the order of the axes.
+    /// Nothing yet: what [`Slabs`] has here.
+    pub(super) found: Found,
+    /// Origin of the triangle test, in the mesh's own coordinates.
     pub origin: [f32; 3],
     /// Inverse of the dominant component of the direction.
     pub steepness: f32,
+    /// Direction, its largest component in [1, 2).
+    pub direction: [f32; 3],
+    /// The direction's dominant component.
+    pub depth: f32,
     /// Direction over its dominant component, for the sheared x and y.
     pub shear: [f32; 2],
     /// Axes in the order x, y, z of the sheared space; z is the direction's dominant one.
     pub axes: [u32; 3],
-    /// The direction's dominant component.
-    pub depth: f32,
-    /// Direction, its largest component in [1, 2).
-    pub direction: [f32; 3],
     pub(super) scale: f32,
-    pub(super) unused: [f32; 2],
+    pub(super) advance: f64,
+}
+
+/// The first hit so far; a parameter behind it is the end of the interval.
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Found {
+    /// A parameter before it.
+    pub low: f32,
+    /// Its triangle, or [`MISS`].
+    pub primitive: u32,
+}
+
+/// The first line of a frame, and what its ray has found so far: all that box tests read. Streams have these lines side by
+/// side: of two-line frames in turns, box tests use every other set of the first-level cache.
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C, align(64))]
+pub struct Slabs {
+    /// See [`Frame::inverse`].
+    pub inverse: [f32; 3],
+    /// See [`Frame::near_bias`].
+    pub near_bias: [f32; 3],
+    /// See [`Frame::far_bias`].
+    pub far_bias: [f32; 3],
+    local: [f32; 3],
+    /// See [`Frame::tmin`].
+    pub tmin: f32,
+    /// Nothing beyond is of interest any more.
+    pub tmax: f32,
+    /// The first hit.
+    pub found: Found,
+}
+
+/// The second line of a frame: all that triangle tests read.
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C, align(64))]
+pub struct Shears {
+    /// See [`Frame::origin`].
+    pub origin: [f32; 3],
+    /// See [`Frame::steepness`].
+    pub steepness: f32,
+    direction: [f32; 3],
+    depth: f32,
+    /// See [`Frame::shear`].
+    pub shear: [f32; 2],
+    /// See [`Frame::axes`].
+    pub axes: [u32; 3],
+    scale: f32,
+    advance: f64,
+}
+
+impl Slabs {
+    /// The interval and what was found, in a row; the triangle is bits.
+    #[inline(always)]
+    pub fn standing(&self) -> &[f32; 4] {
+        let rows: &[[f32; 4]; 4] = bytemuck::cast_ref(self);
+        &rows[3]
+    }
+}
+
+impl Shears {
+    /// In rows: origin and steepness, direction and depth, shear and two axes; axes are bits.
+    #[inline(always)]
+    pub fn rows(&self) -> [&[f32; 4]; 3] {
+        let rows: &[[f32; 4]; 4] = bytemuck::cast_ref(self);
+        [&rows[0], &rows[1], &rows[2]]
+    }
+
+    /// [`Frame::parameter`].
+    #[inline(always)]
+    pub fn parameter(&self, t: f32) -> f32 {
+        parameter(t, self.scale, self.advance)
+    }
 }
 
 impl Frame {
@@ -150,13 +223,14 @@ impl Frame {
         self.far_bias = (bias + slack).to_array();
         self.tmin = tmin;
         self.tmax = tmax;
+        self.found = Found { low: tmax, primitive: MISS };
         self.local = local.to_array();
         self.advance = 0.0;
         self.direction = direction.to_array();
         self.axes = dominant_last(direction);
         self.scale = 1.0;
         let [x, y, steepest] = self.axes.map(|axis| axis as usize);
-        self.origin = [origin[x], origin[y], origin[steepest]];
+        self.origin = origin.to_array();
         self.depth = direction[steepest];
         self.steepness = self.inverse[steepest];
         self.shear = [self.direction[x] * self.steepness, self.direction[y] * self.steepness];
@@ -198,12 +272,25 @@ impl Frame {
         (near <= far).then_some(near)
     }
 
-    /// What triangle tests need: origin and steepness, then shear and two axes, then the last axis and the depth; axes
-    /// are bits.
+    /// The first line.
     #[inline(always)]
-    pub(super) fn sheared(&self) -> [&[f32; 4]; 3] {
-        let numbers: &[[f32; 4]; 8] = bytemuck::cast_ref(self);
-        [&numbers[4], &numbers[5], &numbers[6]]
+    pub fn slabs(&self) -> &Slabs {
+        let [slabs, _]: &[Slabs; 2] = bytemuck::cast_ref(self);
+        slabs
+    }
+
+    /// The second line.
+    #[inline(always)]
+    pub fn shears(&self) -> &Shears {
+        let [_, shears]: &[Shears; 2] = bytemuck::cast_ref(self);
+        shears
+    }
+
+    /// The frame of two lines; it ends where nothing is of interest any more.
+    #[inline(always)]
+    pub fn of_lines(slabs: &Slabs, shears: &Shears) -> Self {
+        let [slabs, shears]: [&[f32; 16]; 2] = [bytemuck::cast_ref(slabs), bytemuck::cast_ref(shears)];
+        bytemuck::cast([*slabs, *shears])
     }
 
     /// The signs of the direction: bit `k` is set where it falls along axis `k`.
@@ -221,12 +308,13 @@ impl Frame {
     /// A parameter of the frame in lengths of the ray's own direction, from its own origin.
     #[inline]
     pub fn parameter(&self, t: f32) -> f32 {
-        if self.advance == 0.0 {
-            t * self.scale
-        } else {
-            ((f64::from(t) + self.advance) * f64::from(self.scale)) as f32
-        }
+        parameter(t, self.scale, self.advance)
     }
+}
+
+#[inline(always)]
+fn parameter(t: f32, scale: f32, advance: f64) -> f32 {
+    if advance == 0.0 { t * scale } else { ((f64::from(t) + advance) * f64::from(scale)) as f32 }
 }
 
 /// The inverse of a direction over a power of two, `length`: its own inverse times that, to the bit, where neither over-

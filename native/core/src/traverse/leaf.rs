@@ -115,7 +115,7 @@ impl<'a, S: Simd, P: Probe> Search<'a, S, P> {
     #[inline(always)]
     fn test<const ANY: bool>(&mut self, block: &Block, count: u32, place: &mut usize) -> bool {
         self.probe.tests(count);
-        let sheared = Sheared::of_block(self.simd, self.frame, block);
+        let sheared = Sheared::of_block(self.simd, self.frame.shears(), block);
         let candidates = !sheared.missed(self.simd) & ((1 << count) - 1);
         candidates != 0 && self.candidates::<ANY>(block, &sheared, candidates, place)
     }

@@ -21,6 +21,7 @@ mod tetrahedra;
 mod tile;
 mod together;
 mod waiting;
+mod weights;
 
 pub use batch::Tracer;
 pub use single::Walker;

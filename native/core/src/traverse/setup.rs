@@ -1,7 +1,10 @@
 //! Several frames at once: [`Frame::new`] in vectors, operation by operation, so that both give the same bits.
 
-use super::frame::{DILATION, Domain, Frame, NEAR, PARALLEL};
+use bytemuck::Zeroable;
+
+use super::frame::{DILATION, Domain, Frame, NEAR, PARALLEL, Shears, Slabs};
 use crate::{
+    ray::MISS,
     simd::{Arithmetic, Simd},
     triangle::LANES,
 };
@@ -112,21 +115,34 @@ impl<S: Simd> Frames<S> {
     /// The frames one by one.
     #[inline(always)]
     pub fn store(&self, simd: S, frames: &mut [Frame; LANES]) {
+        let (slabs, shears) = self.lines(simd);
+        for lane in 0..LANES {
+            frames[lane] = Frame::of_lines(&slabs[lane], &shears[lane]);
+        }
+    }
+
+    /// The lines of the frames one by one.
+    #[inline(always)]
+    pub fn lines(&self, simd: S) -> ([Slabs; LANES], [Shears; LANES]) {
         let zero = simd.splat(0.0);
         let Self { tmin, tmax, scale, .. } = *self;
-        let Sheared { axes, origin: o, depth, steepness, shear } = Sheared::new(simd, self);
-        let ([i, n, f], [l, d]) = ([self.inverse, self.near_bias, self.far_bias], [self.local, self.direction]);
-        let rows = [
+        let Sheared { axes, depth, steepness, shear } = Sheared::new(simd, self);
+        let [i, n, f] = [self.inverse, self.near_bias, self.far_bias];
+        let [l, o, d] = [self.local, self.origin, self.direction];
+        let slabs = [
             simd.transpose([i[0], i[1], i[2], n[0], n[1], n[2], f[0], f[1]]),
-            simd.transpose([f[2], tmin, tmax, l[0], l[1], l[2], zero, zero]),
-            simd.transpose([o[0], o[1], o[2], steepness, shear[0], shear[1], axes[0], axes[1]]),
-            simd.transpose([axes[2], depth, d[0], d[1], d[2], scale, zero, zero]),
+            simd.transpose([f[2], l[0], l[1], l[2], tmin, tmax, tmax, bits(simd, MISS)]),
         ];
+        let shears = [
+            simd.transpose([o[0], o[1], o[2], steepness, d[0], d[1], d[2], depth]),
+            simd.transpose([shear[0], shear[1], axes[0], axes[1], axes[2], scale, zero, zero]),
+        ];
+        let mut lines = ([Slabs::zeroed(); LANES], [Shears::zeroed(); LANES]);
         for lane in 0..LANES {
-            let [a, b, c, d] = rows;
-            frames[lane] =
-                bytemuck::cast([simd.store(a[lane]), simd.store(b[lane]), simd.store(c[lane]), simd.store(d[lane])]);
+            lines.0[lane] = bytemuck::cast([simd.store(slabs[0][lane]), simd.store(slabs[1][lane])]);
+            lines.1[lane] = bytemuck::cast([simd.store(shears[0][lane]), simd.store(shears[1][lane])]);
         }
+        lines
     }
 }
 
@@ -141,7 +157,6 @@ fn halves<S: Simd>(simd: S, [x, y, z]: &[<S::Wide as Arithmetic>::F32; 3]) -> [[
 struct Sheared<S: Simd> {
     /// As bits.
     axes: [S::F32; 3],
-    origin: [S::F32; 3],
     depth: S::F32,
     steepness: S::F32,
     shear: [S::F32; 2],
@@ -154,14 +169,11 @@ impl<S: Simd> Sheared<S> {
         let size = [simd.abs(x), simd.abs(y), simd.abs(z)];
         let greatest = simd.max(simd.max(size[1], size[2]), size[0]);
         let sizes = [size[0], greatest, size[1], size[2]];
-        let [axes, origin, direction] = [
-            in_order(simd, sizes, [bits(simd, 0), bits(simd, 1), bits(simd, 2)]),
-            in_order(simd, sizes, frames.origin),
-            in_order(simd, sizes, frames.direction),
-        ];
+        let axes = in_order(simd, sizes, [bits(simd, 0), bits(simd, 1), bits(simd, 2)]);
+        let direction = in_order(simd, sizes, frames.direction);
         let steepness = choose(simd, sizes, frames.inverse);
         let shear = [simd.mul(direction[0], steepness), simd.mul(direction[1], steepness)];
-        Self { axes, origin, depth: direction[2], steepness, shear }
+        Self { axes, depth: direction[2], steepness, shear }
     }
 }
 

@@ -4,19 +4,16 @@
 use std::time::Instant;
 
 use super::{
-    Tracer,
-    answers::{self, Answer},
+    Tracer, answers,
     batch::Room,
     frame::Domain,
     pace::{Pace, Trial},
     packet,
-    stream::{self, Bin, bin_size},
+    stream::{self, bin_size},
     tile::{self, EXTENTS},
-    waiting::Waiting,
 };
 use crate::{
     Error,
-    mesh::Reader,
     ray::{Eight, Hit, HitsMut, MISS, Rays},
     simd::{Kernel, Simd},
     triangle::LANES,
@@ -65,6 +62,12 @@ fn are_side_by_side(rays: &Rays<'_>, domain: &Domain) -> bool {
         pairs += 1;
     }
     2 * near >= pairs
+}
+
+/// As many of a list as are evaluated at once, or what is left of them.
+#[inline(always)]
+fn sixteen(list: &[u16], first: usize) -> &[u16] {
+    &list[first.min(list.len())..list.len().min(first + answers::RAYS)]
 }
 
 /// Rays between two looks at the clock where they walk in packets. After a stream the first of them wait for the tree:
@@ -199,52 +202,35 @@ impl<'a, T: Take + ?Sized, const ANY: bool> Together<'a, T, ANY> {
     /// Tell what the rays of a bin hit.
     #[inline(always)]
     fn answer<S: Simd>(&mut self, simd: S) {
-        let Room { bin, waiting, .. } = &*self.room;
-        let mesh = self.tracer.mesh.reader();
+        let Room { bin, waiting, .. } = &mut *self.room;
         if ANY {
             for slot in 0..bin.len() {
-                let (place, _, best) = bin.ray(slot);
-                self.to.take(waiting.index(place), Hit { primitive: best.primitive, ..Hit::MISS });
+                let hit = Hit { primitive: bin.best(slot).primitive, ..Hit::MISS };
+                self.to.take(waiting.index(bin.place(slot)), hit);
             }
             return;
         }
-        bin.warm(simd, self.tracer.mesh);
-        let nobody = Answer { slot: 0, frame: bin.ray(0).1, primitive: MISS };
-        let (mut answers, mut count) = ([nobody; answers::RAYS], 0);
-        for slot in 0..bin.len() {
-            let (place, frame, best) = bin.ray(slot);
-            if best.primitive == MISS {
-                self.to.take(waiting.index(place), Hit::MISS);
-                continue;
-            }
-            answers[count] = Answer { slot, frame, primitive: best.primitive };
-            count += 1;
-            if count == answers::RAYS {
-                Self::tell(simd, waiting, bin, &answers, mesh, self.to);
-                count = 0;
-            }
+        bin.part();
+        for &slot in bin.missed() {
+            self.to.take(waiting.index(bin.place(slot.into())), Hit::MISS);
         }
-        if count != 0 {
-            let first = answers[0];
-            answers[count..].fill(first);
-            Self::tell(simd, waiting, bin, &answers, mesh, self.to);
-        }
-    }
-
-    /// Tell what rays that hit something hit; some may be told twice.
-    #[inline(always)]
-    fn tell<S: Simd>(
-        simd: S,
-        waiting: &Waiting,
-        bin: &Bin,
-        answers: &[Answer<'_>; answers::RAYS],
-        mesh: Reader<'_>,
-        to: &mut T,
-    ) {
-        let hits = answers::evaluate(simd, answers, mesh);
-        for lane in 0..answers::RAYS {
-            let (place, frame, _) = bin.ray(answers[lane].slot);
-            to.take(waiting.index(place), frame.in_ray_units(hits[lane]));
+        let (mesh, met) = (self.tracer.mesh.reader(), bin.met());
+        for first in (0..met.len()).step_by(answers::RAYS) {
+            // The triangles of the next but one, and the corners of the next, are to be near when they are wanted.
+            for &slot in sixteen(met, first + 2 * answers::RAYS) {
+                mesh.warm_triangle(simd, bin.best(slot.into()).primitive);
+            }
+            for &slot in sixteen(met, first + answers::RAYS) {
+                mesh.warm_corners(simd, bin.best(slot.into()).primitive);
+            }
+            let mut slots = [met[first].into(); answers::RAYS];
+            for (slot, &ray) in slots.iter_mut().zip(sixteen(met, first)) {
+                *slot = ray.into();
+            }
+            let hits = answers::evaluate(simd, bin, &slots, mesh);
+            for (slot, hit) in slots.into_iter().zip(hits) {
+                self.to.take(waiting.index(bin.place(slot)), hit);
+            }
         }
     }
 }

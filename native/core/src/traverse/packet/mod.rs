@@ -21,7 +21,7 @@ mod rays;
 
 use bytemuck::Zeroable;
 
-use self::{leaf::Triangles, rays::Packet};
+use self::rays::Packet;
 use super::{
     Tracer,
     frame::{Domain, Frame},
@@ -31,6 +31,7 @@ use super::{
     setup::Frames,
     stream::warm,
     together::Take,
+    weights::Triangles,
 };
 use crate::{
     Error, Mesh,
@@ -86,7 +87,7 @@ pub fn each<S: Simd, T: Take + ?Sized, const GRIDS: bool>(
         if first + SIZE <= rays.len()
             && let Some(frames) = Frames::new(simd.wide(), &rays.sixteen(simd, first), &structure.domain)
         {
-            let hit = trace::<S, GRIDS>(simd, structure, mesh, (&frames, rays.part(first, SIZE)), memory, stack);
+            let hit = trace::<S, GRIDS>(simd, scene, mesh, (&frames, rays.part(first, SIZE)), memory, stack);
             for half in [0, LANES] {
                 let mut hits = Eight::MISSES;
                 for lane in 0..LANES {
@@ -109,7 +110,7 @@ pub fn each<S: Simd, T: Take + ?Sized, const GRIDS: bool>(
 #[inline(always)]
 fn trace<S: Simd, const GRIDS: bool>(
     simd: S,
-    structure: &Structure,
+    (structure, root): (&Structure, View<'_>),
     mesh: &Mesh,
     (frames, rays): (&Frames<S::Wide>, Rays<'_>),
     memory: &mut Memory,
@@ -123,10 +124,10 @@ fn trace<S: Simd, const GRIDS: bool>(
     visits.clear();
     visits.push(Visit { node: structure.root, rays: all });
     // Visits from `floor` up are in the lazy cell that the rays are in.
-    let (mut here, mut floor) = (structure.view(), 0);
+    let (mut here, mut floor) = (root, 0);
     loop {
         if GRIDS && visits.len() == floor {
-            (here, floor) = (structure.view(), 0);
+            (here, floor) = (root, 0);
         }
         let Some(visit) = visits.pop() else { break };
         let going = visit.rays & open;
@@ -197,13 +198,16 @@ impl Leaf<'_> {
     /// Which of the rays `going` hit one of the triangles.
     #[inline(always)]
     fn hit<S: Simd>(&self, simd: S, packet: &Packet<S>, going: u32) -> u32 {
-        let (triangles, near) = Triangles::new(simd, packet, self.block);
+        let mut near = leaf::near(simd, packet, self.block) & ((1 << self.count) - 1);
+        if near == 0 {
+            return 0;
+        }
+        let triangles = Triangles::new(simd, self.block, packet.first);
         let mut rest = going;
-        let mut near = near & ((1 << self.count) - 1);
         while near != 0 {
             let lane = near.trailing_zeros() as usize;
             near &= near - 1;
-            let [sure, mut unclear] = triangles.hit(packet, rest, lane);
+            let [sure, mut unclear] = leaf::hit(&triangles, packet, rest, lane);
             rest &= !sure;
             while unclear != 0 {
                 let ray = unclear.trailing_zeros();

@@ -1,6 +1,9 @@
-//! A block of triangles against the rays of a list, sixteen at once: one triangle after another, by the arithmetic that
-//! one ray has with eight triangles, so that single precision decides as much. Which rays may hit which triangles is
-//! found out first, without a branch, and then where.
+//! A block of triangles against the rays of a list: sixteen rays at once, one triangle after another, or, where they are
+//! few, one ray against all triangles. Of sixteen, [`weights`] tells without a branch which may hit which triangle, and
+//! then where; what that leaves open [`crossing`] decides, as for one ray, and what is left then the exact test.
+//!
+//! [`weights`]: crate::traverse::weights
+//! [`crossing`]: crate::traverse::crossing
 
 use super::{
     Bin,
@@ -10,18 +13,16 @@ use crate::{
     Mesh,
     simd::{Arithmetic, Simd},
     traverse::{
-        crossing::{Sheared, Stored},
+        crossing::{Crossings, Sheared},
         leaf::Best,
+        weights::{Triangles, Weights},
     },
     triangle::{Block, LANES},
 };
 
-/// Fewer rays than this take less time one by one, against eight triangles each. With AVX-512, bounces took as long with
-/// 8 and 16 as with 12, and 1.1 times as long on the dragon and in the soup with 5.
-pub const FEW: usize = 12;
-
-/// Room for a block's triangles before sixteen rays.
-pub type Memory = [Stored; LANES];
+/// Fewer rays than this take less time one by one, against eight triangles each. With AVX-512, bounces took 1/1.02 of the
+/// time of 12 (bunny2, room 1/1.03; Sponza 1.02 times).
+pub const FEW: usize = 6;
 
 /// The triangles of a leaf.
 pub struct Leaf<'a> {
@@ -30,6 +31,19 @@ pub struct Leaf<'a> {
     /// Triangles in the block.
     pub count: u32,
 }
+
+/// What is known of a triangle before sixteen rays, for a second look.
+#[derive(Debug, Clone, Copy, Default)]
+#[repr(align(64))]
+pub struct Seen {
+    least: [f32; RAYS],
+    determinant: [f32; RAYS],
+    side: [f32; RAYS],
+    doubt: [f32; RAYS],
+}
+
+/// Room for a block's triangles.
+pub type Memory = [Seen; LANES];
 
 impl Leaf<'_> {
     /// Test the triangles against the rays of a list, sixteen by sixteen; returns those that are left, fewer than [`FEW`].
@@ -44,10 +58,12 @@ impl Leaf<'_> {
         if list.len() < FEW {
             return list;
         }
-        let corners = Corners::new(simd, self.block);
+        let [x, y, z] = &self.block.corner[0];
+        let from = [x[0], y[0], z[0]];
+        let triangles = Triangles::new(simd, self.block, from);
         while list.len() >= FEW {
             let (first, rest) = list.split_at(list.len().min(RAYS));
-            self.sixteen::<S, ANY>(simd, &corners, first, bin, memory);
+            self.sixteen::<S, ANY>(simd, (&triangles, from), first, bin, memory);
             list = rest;
         }
         list
@@ -57,112 +73,144 @@ impl Leaf<'_> {
     fn sixteen<S: Simd, const ANY: bool>(
         &self,
         simd: S,
-        corners: &Corners,
+        (triangles, from): (&Triangles, [f32; 3]),
         list: &[u16],
         bin: &mut Bin,
         memory: &mut Memory,
     ) {
         let wide = simd.wide();
         let mut rays = Sixteen::new(simd, bin, list);
+        let away = rays.away(wide, from);
         let mut going = ((1 << list.len()) - 1) & wide.le(rays.tmin, rays.high);
-        let (mut candidates, mut triangles) = ([0; LANES], 0);
-        for triangle in 0..(self.count as usize).min(LANES) {
-            let sheared = Sheared::new(wide, corners.in_order(wide, triangle, rays.axes), rays.origin, rays.shear);
-            sheared.store(simd, &mut memory[triangle]);
-            candidates[triangle] = going & !sheared.missed(wide);
-            triangles |= u32::from(candidates[triangle] != 0) << triangle;
+        let (mut candidates, mut rest) = ([0; LANES], 0);
+        for lane in 0..(self.count as usize).min(LANES) {
+            let weights = triangles.weigh(wide, lane, (rays.origin, rays.direction), away);
+            candidates[lane] = wide.le(wide.splat(0.0), wide.add(weights.least, weights.doubt));
+            rest |= u32::from(candidates[lane] & going != 0) << lane;
+            memory[lane] = Seen {
+                least: simd.store_wide(weights.least),
+                determinant: simd.store_wide(weights.determinant),
+                side: simd.store_wide(weights.side),
+                doubt: simd.store_wide(weights.doubt),
+            };
         }
         let mut changed = 0;
-        while triangles != 0 {
-            let triangle = triangles.trailing_zeros() as usize & (LANES - 1);
-            triangles &= triangles - 1;
-            let sheared = Sheared::load(simd, &memory[triangle]);
-            let crossings = sheared.cross(wide, rays.steepness, rays.tmin, rays.high);
-            let candidates = going & candidates[triangle] & !crossings.outside;
-            let nearer = if ANY { u32::MAX } else { !wide.le(rays.low, crossings.high) };
-            let hit = candidates & crossings.sure & nearer;
-            let primitive = wide.splat(f32::from_bits(self.block.primitive[triangle]));
-            rays.primitive = wide.select(hit, primitive, rays.primitive);
-            if ANY {
-                going &= !hit;
-            } else {
-                rays.low = wide.select(hit, crossings.low, rays.low);
-                rays.high = wide.select(hit, crossings.high, rays.high);
+        while rest != 0 {
+            let lane = rest.trailing_zeros() as usize & (LANES - 1);
+            rest &= rest - 1;
+            let weights = memory[lane].weights(simd);
+            let depth = (triangles.depth(wide, lane, rays.origin, weights.side), triangles.blur(wide, lane, away));
+            let crossings = weights.cross(wide, depth, (rays.tmin, rays.high));
+            let mut unclear = going & candidates[lane] & !crossings.outside;
+            let mut hit = rays.take::<_, ANY>(wide, unclear, &crossings, self.block.primitive[lane]);
+            unclear &= !hit;
+            if unclear != 0 {
+                let (crossings, missed) = self.look_again(simd, bin, &rays, lane);
+                unclear &= !(missed | crossings.outside);
+                let more = rays.take::<_, ANY>(wide, unclear, &crossings, self.block.primitive[lane]);
+                unclear &= !more;
+                hit |= more;
             }
             changed |= hit;
-            let unclear = candidates & !hit;
             if unclear != 0 {
                 rays.write::<ANY>(simd, bin, changed);
-                let decided = self.decide::<S, ANY>(&rays, bin, triangle, unclear);
+                hit |= self.decide::<S, ANY>(&rays, bin, lane, unclear);
                 rays.read(simd, bin);
                 changed = 0;
-                if ANY {
-                    going &= !decided;
-                }
             }
-            if ANY && going == 0 {
-                break;
+            if ANY {
+                going &= !hit;
+                if going == 0 {
+                    break;
+                }
             }
         }
         rays.write::<ANY>(simd, bin, changed);
     }
 
+    /// The crossings with one triangle by the arithmetic of the single ray, and which rays surely miss it.
+    #[inline(always)]
+    fn look_again<S: Simd>(&self, simd: S, bin: &Bin, rays: &Sixteen<S>, lane: usize) -> (Crossings<S::Wide>, u32) {
+        let wide = simd.wide();
+        let (shear, axes) = rays.shear(simd, bin);
+        let sheared = Sheared::new(wide, self.block.corners(lane).each_ref(), rays.origin, axes, shear);
+        (sheared.cross(wide, rays.steepness, rays.tmin, rays.high), sheared.missed(wide))
+    }
+
     /// Ask the exact test of one triangle and the rays of some lanes; tells which of them hit it.
     #[cold]
     #[inline(never)]
-    fn decide<S: Simd, const ANY: bool>(&self, rays: &Sixteen<S>, bin: &mut Bin, triangle: usize, lanes: u32) -> u32 {
-        let (mut rest, mut hits) = (lanes, 0);
+    fn decide<S: Simd, const ANY: bool>(&self, rays: &Sixteen<S>, bin: &mut Bin, lane: usize, of: u32) -> u32 {
+        let (mut rest, mut hits) = (of, 0);
         while rest != 0 {
-            let lane = rest.trailing_zeros();
+            let ray = rest.trailing_zeros();
             rest &= rest - 1;
-            let id = rays.id(lane);
-            let frame = &bin.frames[id];
-            if let Some(hit) = self.block.intersect(triangle, frame) {
-                let best = bin.hits[id].best().or(Best::exactly(&hit), frame, self.mesh);
-                bin.keep::<ANY>(id, best);
-                hits |= 1 << lane;
+            if self.decide_one::<ANY>(bin, rays.id(ray), lane) {
+                hits |= 1 << ray;
             }
         }
         hits
     }
-}
 
-/// A triangle's corners, and a number behind each.
-type Rows = [[[f32; 4]; 2]; LANES];
+    /// The same for one ray.
+    #[cold]
+    #[inline(never)]
+    fn decide_one<const ANY: bool>(&self, bin: &mut Bin, id: usize, lane: usize) -> bool {
+        let frame = &bin.frame(id);
+        let hit = self.block.intersect(lane, frame);
+        if let Some(hit) = &hit {
+            let best = bin.best(id).or(Best::exactly(hit), frame, self.mesh);
+            bin.keep::<ANY>(id, best);
+        }
+        hit.is_some()
+    }
 
-/// Where the corners of a block's triangles are: the first two, then the third.
-struct Corners(Rows, Rows);
-
-impl Corners {
+    /// Test the triangles against one ray.
     #[inline(always)]
-    fn new<S: Simd>(simd: S, block: &Block) -> Self {
-        let [a, b, c] = [&block.corner[0], &block.corner[1], &block.corner[2]];
-        Self(rows(simd, [a, b]), rows(simd, [c, c]))
+    pub fn one<S: Simd, const ANY: bool>(&self, simd: S, bin: &mut Bin, id: usize) {
+        if bin.has_ended(id) {
+            return;
+        }
+        let (slabs, shears) = (&bin.slabs()[id], &bin.shears()[id]);
+        let sheared = Sheared::of_block(simd, shears, self.block);
+        let mut candidates = !sheared.missed(simd) & ((1 << self.count) - 1);
+        if candidates == 0 {
+            return;
+        }
+        let (tmin, tmax) = (simd.splat(slabs.tmin), simd.splat(slabs.tmax));
+        let crossings = sheared.cross(simd, simd.splat(shears.steepness), tmin, tmax);
+        candidates &= !crossings.outside;
+        let (low, high) = (simd.store(crossings.low), simd.store(crossings.high));
+        while candidates != 0 {
+            let lane = candidates.trailing_zeros() as usize & (LANES - 1);
+            candidates &= candidates - 1;
+            let best = bin.best(id);
+            let is_sure = crossings.sure >> lane & 1 == 1;
+            let hit = if is_sure && (ANY || high[lane] < best.low) {
+                let hit = Best { low: low[lane], high: high[lane], primitive: self.block.primitive[lane] };
+                bin.keep::<ANY>(id, hit);
+                true
+            } else if low[lane] > best.high {
+                false
+            } else {
+                self.decide_one::<ANY>(bin, id, lane)
+            };
+            if ANY && hit {
+                return;
+            }
+        }
     }
+}
 
-    /// One triangle's, each in the order of every ray's axes.
+impl Seen {
     #[inline(always)]
-    fn in_order<W: Arithmetic>(&self, wide: W, triangle: usize, axes: [W::F32; 3]) -> [[W::F32; 3]; 3] {
-        let ([a, b], [c, _]) = (&self.0[triangle & (LANES - 1)], &self.1[triangle & (LANES - 1)]);
-        [in_order(wide, a, axes), in_order(wide, b, axes), in_order(wide, c, axes)]
+    fn weights<S: Simd>(&self, simd: S) -> Weights<S::Wide> {
+        let Self { least, determinant, side, doubt } = self;
+        Weights {
+            least: simd.load_wide(least),
+            determinant: simd.load_wide(determinant),
+            side: simd.load_wide(side),
+            doubt: simd.load_wide(doubt),
+        }
     }
-}
-
-#[inline(always)]
-fn rows<S: Simd>(simd: S, [a, b]: [&[[f32; LANES]; 3]; 2]) -> Rows {
-    let (a, b) = (
-        [simd.load(&a[0]), simd.load(&a[1]), simd.load(&a[2])],
-        [simd.load(&b[0]), simd.load(&b[1]), simd.load(&b[2])],
-    );
-    let transposed = simd.transpose([a[0], a[1], a[2], a[2], b[0], b[1], b[2], b[2]]);
-    let mut rows = [[[0.0; 4]; 2]; LANES];
-    for lane in 0..LANES {
-        rows[lane] = bytemuck::cast(simd.store(transposed[lane]));
-    }
-    rows
-}
-
-#[inline(always)]
-fn in_order<W: Arithmetic>(wide: W, row: &[f32; 4], [x, y, z]: [W::F32; 3]) -> [W::F32; 3] {
-    [wide.pick(row, x), wide.pick(row, y), wide.pick(row, z)]
 }

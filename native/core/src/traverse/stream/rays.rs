@@ -1,12 +1,12 @@
 //! The rays of a bin, sixteen at once.
 
-use bytemuck::{Pod, Zeroable};
-
 use super::Bin;
 use crate::{
-    ray::MISS,
     simd::{Arithmetic, Simd},
-    traverse::{frame::Frame, leaf::Best},
+    traverse::{
+        crossing::{Crossings, third_axis},
+        leaf::Best,
+    },
 };
 
 /// Rays that are tested at once.
@@ -15,49 +15,17 @@ pub const RAYS: usize = 16;
 /// A number for every ray.
 type Vector<S> = <<S as Simd>::Wide as Arithmetic>::F32;
 
-/// What a ray has found so far, and where its interval begins.
-#[derive(Debug, Clone, Copy, Pod, Zeroable)]
-#[repr(C)]
-pub struct Standing {
-    low: f32,
-    high: f32,
-    primitive: u32,
-    tmin: f32,
-}
-
-impl Standing {
-    /// Of a ray that has found nothing yet.
-    #[inline(always)]
-    pub fn begin(frame: &Frame) -> Self {
-        Self { low: frame.tmax, high: frame.tmax, primitive: MISS, tmin: frame.tmin }
-    }
-
-    /// The first hit so far.
-    #[inline(always)]
-    pub fn best(&self) -> Best {
-        Best { low: self.low, high: self.high, primitive: self.primitive }
-    }
-
-    /// Make a hit the first so far.
-    #[inline(always)]
-    pub fn set(&mut self, Best { low, high, primitive }: Best) {
-        *self = Self { low, high, primitive, tmin: self.tmin };
-    }
-}
-
 /// Sixteen rays of a bin, and what they have found so far.
 pub struct Sixteen<S: Simd> {
     ids: [usize; RAYS],
     pub origin: [Vector<S>; 3],
+    pub direction: [Vector<S>; 3],
     pub steepness: Vector<S>,
-    pub shear: [Vector<S>; 2],
-    /// As bits.
-    pub axes: [Vector<S>; 3],
     pub tmin: Vector<S>,
-    pub low: Vector<S>,
     pub high: Vector<S>,
+    low: Vector<S>,
     /// As bits.
-    pub primitive: Vector<S>,
+    primitive: Vector<S>,
 }
 
 impl<S: Simd> Sixteen<S> {
@@ -68,19 +36,55 @@ impl<S: Simd> Sixteen<S> {
         for (lane, &id) in list.iter().enumerate() {
             ids[lane & (RAYS - 1)] = usize::from(id);
         }
+        let (slabs, shears) = (bin.slabs(), bin.shears());
         let [mut first, mut second, mut third] = [[&[0.0; 4]; RAYS]; 3];
         for lane in 0..RAYS {
-            [first[lane], second[lane], _] = bin.frames[ids[lane]].sheared();
-            third[lane] = bytemuck::cast_ref(&bin.hits[ids[lane]]);
+            [first[lane], second[lane], _] = shears[ids[lane]].rows();
+            third[lane] = slabs[ids[lane]].standing();
+        }
+        let [x, y, z, steepness] = simd.columns(&first);
+        let [dx, dy, dz, _] = simd.columns(&second);
+        let [tmin, high, low, primitive] = simd.columns(&third);
+        Self { ids, origin: [x, y, z], direction: [dx, dy, dz], steepness, tmin, high, low, primitive }
+    }
+
+    /// How far the origins are from a point, in any coordinate.
+    #[inline(always)]
+    pub fn away(&self, wide: S::Wide, from: [f32; 3]) -> Vector<S> {
+        let mut away = wide.splat(0.0);
+        for k in 0..3 {
+            away = wide.max(wide.abs(wide.sub(self.origin[k], wide.splat(from[k]))), away);
+        }
+        away
+    }
+
+    /// Shears and axes, the latter as bits.
+    #[inline(always)]
+    pub fn shear(&self, simd: S, bin: &Bin) -> ([Vector<S>; 2], [Vector<S>; 3]) {
+        let (shears, mut rows) = (bin.shears(), [&[0.0; 4]; RAYS]);
+        for lane in 0..RAYS {
+            [_, _, rows[lane]] = shears[self.ids[lane]].rows();
         }
         let wide = simd.wide();
-        let [x, y, z, steepness] = simd.columns(&first);
-        let [across, along, kx, ky] = simd.columns(&second);
-        let [low, high, primitive, tmin] = simd.columns(&third);
-        // The three are 0, 1 and 2.
-        let kz = wide.sub_bits(wide.sub_bits(wide.splat(f32::from_bits(3)), kx), ky);
-        let (origin, shear, axes) = ([x, y, z], [across, along], [kx, ky, kz]);
-        Self { ids, origin, steepness, shear, axes, tmin, low, high, primitive }
+        let [across, along, x, y] = simd.columns(&rows);
+        ([across, along], [x, y, third_axis(wide, x, y)])
+    }
+
+    /// Make a triangle that is surely the first hit of some of the lanes theirs; tells of which.
+    #[inline(always)]
+    pub fn take<W, const ANY: bool>(&mut self, wide: W, lanes: u32, crossings: &Crossings<W>, primitive: u32) -> u32
+    where
+        W: Arithmetic,
+        S: Simd<Wide = W>,
+    {
+        let nearer = if ANY { u32::MAX } else { !wide.le(self.low, crossings.high) };
+        let hit = lanes & crossings.sure & nearer;
+        self.primitive = wide.select(hit, wide.splat(f32::from_bits(primitive)), self.primitive);
+        if !ANY {
+            self.low = wide.select(hit, crossings.low, self.low);
+            self.high = wide.select(hit, crossings.high, self.high);
+        }
+        hit
     }
 
     /// Which ray of the bin is in a lane.
@@ -92,11 +96,11 @@ impl<S: Simd> Sixteen<S> {
     /// Read anew what the rays have found so far.
     #[inline(always)]
     pub fn read(&mut self, simd: S, bin: &Bin) {
-        let mut rows = [&[0.0; 4]; RAYS];
+        let (slabs, mut rows) = (bin.slabs(), [&[0.0; 4]; RAYS]);
         for lane in 0..RAYS {
-            rows[lane] = bytemuck::cast_ref(&bin.hits[self.ids[lane]]);
+            rows[lane] = slabs[self.ids[lane]].standing();
         }
-        [self.low, self.high, self.primitive, self.tmin] = simd.columns(&rows);
+        [self.tmin, self.high, self.low, self.primitive] = simd.columns(&rows);
     }
 
     /// Write what the rays of some lanes have found.
