@@ -13,8 +13,6 @@ mod portable;
 mod shuffles;
 mod twice;
 #[cfg(target_arch = "x86_64")]
-mod wide;
-#[cfg(target_arch = "x86_64")]
 mod x86;
 
 #[cfg(target_arch = "aarch64")]

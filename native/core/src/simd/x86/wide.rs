@@ -2,7 +2,7 @@
 
 use std::arch::x86_64::*;
 
-use super::{Arithmetic, Avx512};
+use super::{super::Arithmetic, Avx512};
 
 /// Proof that the processor has AVX-512 F and DQ.
 #[derive(Debug, Clone, Copy)]
