@@ -115,16 +115,14 @@ pub fn evaluate(frame: &Frame, relative: [[f32; 3]; 3], primitive: u32) -> Hit {
     weigh(frame, [edge(c, b), edge(a, c), edge(b, a)], [a[2], b[2], c[2]], primitive)
 }
 
-/// The parameter and the weights, evaluated in double precision and rounded to single. With one division: three took
-/// a tenth of the time of a picture's cheapest rays.
+/// The parameter and the weights, evaluated in double precision and rounded once. By one division for all three, and not
+/// rounded once, bounces took 1/1.02 of the time, no more than the noise, and single rays of the room 1.08 times.
 #[inline(always)]
 fn weigh(frame: &Frame, [u, v, w]: [f64; 3], [a, b, c]: [f64; 3], primitive: u32) -> Hit {
     let determinant = u + v + w;
     let depth = f64::from(frame.depth);
-    let per_length = 1.0 / (determinant * depth);
-    let share = per_length * depth;
-    let t = (u * a + v * b + w * c) * per_length;
-    Hit { t: t as f32, primitive, u: (v * share) as f32, v: (w * share) as f32 }
+    let t = ((u * a + v * b + w * c) / (determinant * depth)) as f32;
+    Hit { t, primitive, u: (v / determinant) as f32, v: (w / determinant) as f32 }
 }
 
 #[inline(always)]

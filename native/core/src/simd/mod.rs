@@ -117,8 +117,8 @@ pub trait Simd: Arithmetic {
     fn sub_f64(self, a: Self::F64, b: Self::F64) -> Self::F64;
     /// a * b, rounded once
     fn mul_f64(self, a: Self::F64, b: Self::F64) -> Self::F64;
-    /// 1 / a, rounded once
-    fn reciprocal_f64(self, a: Self::F64) -> Self::F64;
+    /// a / b, rounded once
+    fn div_f64(self, a: Self::F64, b: Self::F64) -> Self::F64;
     /// Bit `i` is set where lane `i` is above zero.
     fn positive_f64(self, value: Self::F64) -> u32;
     /// Bit `i` is set where lane `i` is below zero.

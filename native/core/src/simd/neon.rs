@@ -237,10 +237,8 @@ impl Simd for Neon {
         quarters!(a, b => vmulq_f64)
     }
     #[inline(always)]
-    fn reciprocal_f64(self, a: Quad) -> Quad {
-        // SAFETY: as for `splat`.
-        let one = [unsafe { vdupq_n_f64(1.0) }; 4];
-        quarters!(one, a => vdivq_f64)
+    fn div_f64(self, a: Quad, b: Quad) -> Quad {
+        quarters!(a, b => vdivq_f64)
     }
     #[inline(always)]
     fn positive_f64(self, value: Quad) -> u32 {

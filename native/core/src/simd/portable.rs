@@ -157,8 +157,8 @@ impl Simd for Portable {
         zip(a, b, |a, b| a * b)
     }
     #[inline(always)]
-    fn reciprocal_f64(self, a: [f64; 8]) -> [f64; 8] {
-        a.map(|a| 1.0 / a)
+    fn div_f64(self, a: [f64; 8], b: [f64; 8]) -> [f64; 8] {
+        zip(a, b, |a, b| a / b)
     }
     #[inline(always)]
     fn positive_f64(self, value: [f64; 8]) -> u32 {

@@ -32,9 +32,6 @@ impl<S: Simd> Exact<S> {
         let determinant = simd.add_f64(simd.add_f64(u, v), w);
         let depths = simd.add_f64(simd.mul_f64(u, a[2]), simd.mul_f64(v, b[2]));
         let depths = simd.add_f64(depths, simd.mul_f64(w, c[2]));
-        let depth = simd.widen(depth);
-        let per_length = simd.reciprocal_f64(simd.mul_f64(determinant, depth));
-        let share = simd.mul_f64(per_length, depth);
         let [above, below] = [
             [simd.positive_f64(u), simd.positive_f64(v), simd.positive_f64(w)],
             [simd.negative_f64(u), simd.negative_f64(v), simd.negative_f64(w)],
@@ -42,9 +39,9 @@ impl<S: Simd> Exact<S> {
         let hit = above[0] & above[1] & above[2] | below[0] & below[1] & below[2];
         let missed = (above[0] | above[1] | above[2]) & (below[0] | below[1] | below[2]);
         Self {
-            t: simd.narrow(simd.mul_f64(depths, per_length)),
-            u: simd.narrow(simd.mul_f64(v, share)),
-            v: simd.narrow(simd.mul_f64(w, share)),
+            t: simd.narrow(simd.div_f64(depths, simd.mul_f64(determinant, simd.widen(depth)))),
+            u: simd.narrow(simd.div_f64(v, determinant)),
+            v: simd.narrow(simd.div_f64(w, determinant)),
             hit,
             unclear: 0xff & !(hit | missed),
         }

@@ -169,12 +169,9 @@ macro_rules! vectors {
             unsafe { [_mm256_mul_pd(a[0], b[0]), _mm256_mul_pd(a[1], b[1])] }
         }
         #[inline(always)]
-        fn reciprocal_f64(self, a: [__m256d; 2]) -> [__m256d; 2] {
+        fn div_f64(self, a: [__m256d; 2], b: [__m256d; 2]) -> [__m256d; 2] {
             // SAFETY: as for `splat`.
-            unsafe {
-                let one = _mm256_set1_pd(1.0);
-                [_mm256_div_pd(one, a[0]), _mm256_div_pd(one, a[1])]
-            }
+            unsafe { [_mm256_div_pd(a[0], b[0]), _mm256_div_pd(a[1], b[1])] }
         }
         #[inline(always)]
         fn positive_f64(self, value: [__m256d; 2]) -> u32 {
