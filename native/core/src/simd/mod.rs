@@ -6,6 +6,7 @@
 //! This folder is the only home of `unsafe`.
 #![allow(unsafe_code)]
 
+mod guess;
 #[cfg(target_arch = "aarch64")]
 mod neon;
 mod portable;
@@ -15,6 +16,7 @@ mod twice;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
+pub use guess::guessed;
 #[cfg(target_arch = "aarch64")]
 pub use neon::Neon;
 pub use portable::Portable;

@@ -12,7 +12,7 @@ use crate::{
     Mesh,
     accel::structure::{Node, NodeRef, Structure, Target, View},
     ray::Hit,
-    simd::Simd,
+    simd::{Simd, guessed},
     triangle::LANES,
 };
 
@@ -157,15 +157,17 @@ pub fn trace_below<'a, S: Simd, P: Probe, const GRIDS: bool, const ANY: bool>(
     }
 }
 
-/// The nearest of the children met; the others go to the stack, the farthest first.
+/// The nearest of the children met; the others go to the stack, the farthest first. With branches: the children of most
+/// rays are guessed right, and the next node is read early. The others in the order of the octant, written all at once
+/// without a branch (by permutation and compression of vectors), made single rays take 1.07 to 1.4 times as long.
 #[inline(always)]
 fn descend(node: &Node, met: u32, near: &[f32; LANES], stack: &mut [Entry], depth: &mut usize) -> NodeRef {
     let entry = |lane: usize| Entry { near: near[lane & 7], node: node.child[lane & 7] };
     let mut rest = met & (met - 1);
-    let mut nearest = entry(met.trailing_zeros() as usize);
+    let mut nearest = entry(guessed(met.trailing_zeros()));
     let base = *depth;
     while rest != 0 {
-        let mut other = entry(rest.trailing_zeros() as usize);
+        let mut other = entry(guessed(rest.trailing_zeros()));
         rest &= rest - 1;
         if other.near < nearest.near {
             std::mem::swap(&mut other, &mut nearest);

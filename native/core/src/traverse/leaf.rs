@@ -4,7 +4,7 @@ use super::{crossing::Sheared, frame::Frame, probe::Probe};
 use crate::{
     Mesh,
     ray::{Hit, MISS},
-    simd::Simd,
+    simd::{Simd, guessed},
     triangle::{self, Block, LANES},
 };
 
@@ -140,7 +140,7 @@ impl<'a, S: Simd, P: Probe> Search<'a, S, P> {
         }
         let (low, high) = (simd.store(crossings.low), simd.store(crossings.high));
         while candidates != 0 {
-            let lane = candidates.trailing_zeros() as usize & (LANES - 1);
+            let lane = guessed(candidates.trailing_zeros()) & (LANES - 1);
             candidates &= candidates - 1;
             let hit = if crossings.sure >> lane & 1 == 1 {
                 Best { low: low[lane], high: high[lane], primitive: block.primitive[lane] }
