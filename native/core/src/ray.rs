@@ -57,6 +57,16 @@ impl<'a> Column<'a> {
         }
     }
 
+    /// The values of rays `index` to `index + 15`.
+    #[inline(always)]
+    fn sixteen<S: Simd>(&self, simd: S, index: usize) -> <S::Wide as Arithmetic>::F32 {
+        match self.stride {
+            0 => simd.wide().splat(self.values[0]),
+            1 => simd.load_wide(self.span(index)),
+            _ => simd.both([self.eight(simd, index), self.eight(simd, index + LANES)]),
+        }
+    }
+
     /// The values from one on.
     #[inline(always)]
     fn span<const N: usize>(&self, first: usize) -> &[f32; N] {
@@ -186,12 +196,18 @@ impl<'a> Rays<'a> {
     /// Rays `index` to `index + 15`, likewise.
     #[inline(always)]
     pub(crate) fn sixteen<S: Simd>(&self, simd: S, index: usize) -> [<S::Wide as Arithmetic>::F32; 8] {
-        let (low, high) = (self.eight(simd, index), self.eight(simd, index + LANES));
-        let mut columns = [simd.both([low[0], high[0]]); 8];
-        for k in 1..8 {
-            columns[k] = simd.both([low[k], high[k]]);
-        }
-        columns
+        let index = self.first + index;
+        let ([ox, oy, oz], [dx, dy, dz]) = (&self.origin, &self.direction);
+        [
+            ox.sixteen(simd, index),
+            oy.sixteen(simd, index),
+            oz.sixteen(simd, index),
+            dx.sixteen(simd, index),
+            dy.sixteen(simd, index),
+            dz.sixteen(simd, index),
+            self.tmin.sixteen(simd, index),
+            self.tmax.sixteen(simd, index),
+        ]
     }
 
     /// Whether rays `index` and `index + 7` are there and start at one point.
