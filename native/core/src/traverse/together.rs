@@ -172,7 +172,9 @@ impl<'a, T: Take + ?Sized, const ANY: bool> Together<'a, T, ANY> {
         tile::trace::<S, GRIDS>(simd, structure, mesh, tile, visits, stack);
         for group in 0..tile.count {
             for half in [0, LANES] {
-                self.to.take_eight(first + group * tile::RAYS + half, &tile.hits(simd, mesh, group, half));
+                let mut hits = Eight::MISSES;
+                tile.hits(simd, mesh, group, half, &mut hits);
+                self.to.take_eight(first + group * tile::RAYS + half, &hits);
             }
         }
         self.trial.traced_tile(start, taken);

@@ -153,19 +153,18 @@ impl Tile {
         Best { low, high, primitive }
     }
 
-    /// The best hits of eight rays of a group, from `first` on, in the rays' own units.
+    /// Write the best hits of eight rays of a group, from `first` on, in the rays' own units, over misses. To return them
+    /// would copy them by vectors wider than those they were written by.
     #[inline(always)]
-    pub fn hits<S: Simd>(&self, simd: S, mesh: &Mesh, group: usize, first: usize) -> Eight {
+    pub fn hits<S: Simd>(&self, simd: S, mesh: &Mesh, group: usize, first: usize, hits: &mut Eight) {
         // Of all these bits, those of MISS alone are not a number.
         let best = simd.load(eight(&self.groups[group].best, first));
         let met = simd.le(best, best);
-        let mut hits = Eight::MISSES;
         if met != 0 && self.slanted >> group & 1 == 1 {
-            self.set_one_by_one(mesh, group, first, &mut hits);
+            self.set_one_by_one(mesh, group, first, hits);
         } else if met != 0 {
-            self.set_together(simd, mesh, (group, first), met, &mut hits);
+            self.set_together(simd, mesh, (group, first), met, hits);
         }
-        hits
     }
 
     #[inline(never)]
