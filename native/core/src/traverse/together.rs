@@ -125,7 +125,7 @@ impl<'a, T: Take + ?Sized, const ANY: bool> Together<'a, T, ANY> {
                 self.tile::<S, GRIDS>(simd, next)
             };
             if taken == 0 {
-                taken = self.room.waiting.add(simd, self.rays, next, &self.tracer.structure.domain)?;
+                taken = self.wait(simd, next)?;
             }
             next += taken;
             let measured = self.trial.took(taken);
@@ -135,6 +135,19 @@ impl<'a, T: Take + ?Sized, const ANY: bool> Together<'a, T, ANY> {
             }
         }
         Ok(())
+    }
+
+    /// Let the rays from `first` on wait; returns how many. Of those whose closest hits are wanted all miss for now: misses
+    /// side by side take less to write than one by one in the order of the stream, a sixteenth of the bunny's bounces.
+    #[inline(always)]
+    fn wait<S: Simd>(&mut self, simd: S, first: usize) -> Result<usize, Error> {
+        let count = self.room.waiting.add(simd, self.rays, first, &self.tracer.structure.domain)?;
+        if !ANY && count == LANES {
+            self.to.take_eight(first, &Eight::MISSES);
+        } else if !ANY {
+            (first..first + count).for_each(|index| self.to.take(index, Hit::MISS));
+        }
+        Ok(count)
     }
 
     /// Trace all rays that wait.
@@ -212,10 +225,7 @@ impl<'a, T: Take + ?Sized, const ANY: bool> Together<'a, T, ANY> {
             }
             return;
         }
-        bin.part();
-        for &slot in bin.missed() {
-            self.to.take(waiting.index(bin.place(slot.into())), Hit::MISS);
-        }
+        bin.find_met();
         let (mesh, met) = (self.tracer.mesh.reader(), bin.met());
         for first in (0..met.len()).step_by(answers::RAYS) {
             // The triangles of the next but one, and the corners of the next, are to be near when they are wanted.

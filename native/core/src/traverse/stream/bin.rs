@@ -37,9 +37,9 @@ pub struct Bin {
     slabs: Vec<Slabs>,
     shears: Vec<Shears>,
     places: Range<usize>,
-    /// The rays that hit something, as many as `met`, and then the others.
-    order: Vec<u16>,
-    met: usize,
+    /// The rays that hit something, then what is left from before.
+    met: Vec<u16>,
+    count_met: usize,
 }
 
 impl Bin {
@@ -127,29 +127,20 @@ impl Bin {
 
     /// Find out which rays hit something. Without a branch, which could not be predicted.
     #[inline(always)]
-    pub fn part(&mut self) {
+    pub fn find_met(&mut self) {
         let count = self.len();
-        self.order.resize(bin_size(), 0);
-        let (order, mut front, mut back) = (&mut self.order[..count], 0, count);
+        self.met.resize(bin_size(), 0);
+        let (met, mut front) = (&mut self.met[..count], 0);
         for (slot, slabs) in self.slabs[..count].iter().enumerate() {
-            let is_met = slabs.found.primitive != MISS;
-            order[front] = slot as u16;
-            order[back - 1] = slot as u16;
-            front += usize::from(is_met);
-            back -= usize::from(!is_met);
+            met[front] = slot as u16;
+            front += usize::from(slabs.found.primitive != MISS);
         }
-        self.met = front;
+        self.count_met = front;
     }
 
-    /// The rays that hit nothing, by what [`Bin::part`] found.
-    #[inline(always)]
-    pub fn missed(&self) -> &[u16] {
-        &self.order[self.met..self.len()]
-    }
-
-    /// The rays that hit something, likewise.
+    /// The rays that hit something, by what [`Bin::find_met`] found.
     #[inline(always)]
     pub fn met(&self) -> &[u16] {
-        &self.order[..self.met]
+        &self.met[..self.count_met]
     }
 }
