@@ -87,7 +87,7 @@ pub fn each<S: Simd, T: Take + ?Sized, const GRIDS: bool>(
         if first + SIZE <= rays.len()
             && let Some(frames) = Frames::new(simd.wide(), &rays.sixteen(simd, first), &structure.domain)
         {
-            let hit = trace::<S, GRIDS>(simd, scene, mesh, (&frames, rays.part(first, SIZE)), memory, stack);
+            let hit = trace::<S, GRIDS>(simd, scene, mesh, (&frames, rays, first), memory, stack);
             for half in [0, LANES] {
                 let mut hits = Eight::MISSES;
                 for lane in 0..LANES {
@@ -106,17 +106,17 @@ pub fn each<S: Simd, T: Take + ?Sized, const GRIDS: bool>(
     Ok(())
 }
 
-/// Which of sixteen rays hit anything.
+/// Which of sixteen rays, from `first` on, hit anything.
 #[inline(always)]
 fn trace<S: Simd, const GRIDS: bool>(
     simd: S,
     (structure, root): (&Structure, View<'_>),
     mesh: &Mesh,
-    (frames, rays): (&Frames<S::Wide>, Rays<'_>),
+    (frames, rays, first): (&Frames<S::Wide>, &Rays<'_>, usize),
     memory: &mut Memory,
     stack: &mut [Entry],
 ) -> u32 {
-    let packet = Packet::new(simd, frames, rays.get(0).origin.to_array(), &structure.domain);
+    let packet = Packet::new(simd, frames, rays.get(first).origin.to_array(), &structure.domain);
     let Memory { visits, frames: apart } = memory;
     let mut are_written = false;
     let all = packet.all();
@@ -144,7 +144,8 @@ fn trace<S: Simd, const GRIDS: bool>(
                 push(simd, &packet, here, &here.nodes[index as usize], going, visits);
             }
             Target::Leaf { block, count } if going.count_ones() >= FEWEST => {
-                let leaf = Leaf { block: &here.blocks[block as usize], count, rays: &rays, domain: &structure.domain };
+                let block = &here.blocks[block as usize];
+                let leaf = Leaf { block, count, rays, first, domain: &structure.domain };
                 open &= !leaf.hit(simd, &packet, going);
             }
             _ if going == 0 => {}
@@ -190,7 +191,9 @@ struct Leaf<'a> {
     block: &'a Block,
     /// Triangles in it.
     count: u32,
+    /// A batch, and where in it the packet begins.
     rays: &'a Rays<'a>,
+    first: usize,
     domain: &'a Domain,
 }
 
@@ -225,7 +228,7 @@ impl Leaf<'_> {
     #[cold]
     #[inline(never)]
     fn is_hit(&self, lane: usize, ray: usize) -> bool {
-        self.rays.frame(ray, self.domain).is_ok_and(|frame| self.block.intersect(lane, &frame).is_some())
+        self.rays.frame(self.first + ray, self.domain).is_ok_and(|frame| self.block.intersect(lane, &frame).is_some())
     }
 }
 
