@@ -217,6 +217,14 @@ impl<'a> Rays<'a> {
         index + LANES <= self.count && self.origin.iter().all(|axis| axis.get(first) == axis.get(last))
     }
 
+    /// Where ray `index` starts.
+    #[inline(always)]
+    pub(crate) fn origin(&self, index: usize) -> [f32; 3] {
+        let [x, y, z] = &self.origin;
+        let index = self.first + index;
+        [x.get(index), y.get(index), z.get(index)]
+    }
+
     /// Gather ray `index`.
     #[inline]
     pub fn get(&self, index: usize) -> Ray {

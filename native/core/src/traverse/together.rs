@@ -57,8 +57,12 @@ impl Take for [bool] {
 fn are_side_by_side(rays: &Rays<'_>, domain: &Domain) -> bool {
     let (mut near, mut pairs) = (0, 0);
     for index in (1..rays.len()).step_by(SAMPLED) {
-        let apart = rays.get(index).origin - rays.get(index - 1).origin;
-        near += usize::from(apart.abs().max_element() < NEIGHBOURS * domain.half_extent);
+        let (this, before) = (rays.origin(index), rays.origin(index - 1));
+        let mut apart = 0f32;
+        for k in 0..3 {
+            apart = apart.max((this[k] - before[k]).abs());
+        }
+        near += usize::from(apart < NEIGHBOURS * domain.half_extent);
         pairs += 1;
     }
     2 * near >= pairs
@@ -75,7 +79,7 @@ fn sixteen(list: &[u16], first: usize) -> &[u16] {
 const PACKED: usize = 1024;
 
 /// Every so many rays are compared with the one before.
-const SAMPLED: usize = 16;
+const SAMPLED: usize = 32;
 
 /// Half extents of the scene within which rays are near each other: an edge of a cell of the grid over the rays.
 const NEIGHBOURS: f32 = 1.0 / 8.0;

@@ -116,7 +116,7 @@ fn trace<S: Simd, const GRIDS: bool>(
     memory: &mut Memory,
     stack: &mut [Entry],
 ) -> u32 {
-    let packet = Packet::new(simd, frames, rays.get(first).origin.to_array(), &structure.domain);
+    let packet = Packet::new(simd, frames, rays.origin(first), &structure.domain);
     let Memory { visits, frames: apart } = memory;
     let mut are_written = false;
     let all = packet.all();
