@@ -11,7 +11,7 @@ use super::{
     planner::{Planner, Set, open},
     record::Record,
 };
-use crate::{Error, Job, error, simd::Level};
+use crate::{Error, Job, arena::Arena, simd::Level};
 
 /// Parts at the top of at most this many triangles are not divided further: their cells are too few to tell where.
 const WHOLE: usize = SUBTREE / 4;
@@ -22,7 +22,7 @@ const WHOLE: usize = SUBTREE / 4;
 /// [`Error::Cancelled`], [`Error::OutOfMemory`].
 pub fn plan(clusters: &Clusters, leaf_size: usize, job: &Job) -> Result<(Top, Vec<Draft>), Error> {
     let mut cells = clusters.cells()?;
-    let mut spare = error::filled(cells.len(), Record::NONE, "the cells")?;
+    let mut spare = Arena::stale(cells.len(), "the cells")?;
     let (mut top, mut subtrees) = (Top::default(), Vec::new());
     if !cells.is_empty() {
         let upper = upper(Set::new(&mut cells, &mut spare), Level::detect(), job)?;

@@ -17,7 +17,9 @@ use super::{
     record::{Record, UnitCube},
 };
 use crate::{
-    Error, Job, Mesh, error,
+    Error, Job, Mesh,
+    arena::Arena,
+    error,
     simd::{Kernel, Level, Simd},
 };
 
@@ -81,9 +83,14 @@ impl Clusters {
     ///
     /// # Errors
     /// [`Error::OutOfMemory`].
-    pub fn cells(&self) -> Result<Vec<Record>, Error> {
-        let mut cells = error::reserve(self.chunks.iter().map(|chunk| chunk.cells.len()).sum(), "the cells")?;
-        self.chunks.iter().for_each(|chunk| cells.extend_from_slice(&chunk.cells));
+    pub fn cells(&self) -> Result<Arena<Record>, Error> {
+        let mut cells = Arena::stale(self.chunks.iter().map(|chunk| chunk.cells.len()).sum(), "the cells")?;
+        let mut rest = cells.as_mut_slice();
+        for chunk in &self.chunks {
+            let (these, others) = rest.split_at_mut(chunk.cells.len());
+            these.copy_from_slice(&chunk.cells);
+            rest = others;
+        }
         Ok(cells)
     }
 

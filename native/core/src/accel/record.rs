@@ -8,7 +8,7 @@ use crate::{
 };
 
 /// Some triangles that stay together, in 32 bytes: the box around them, where they are listed, and how many they are.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C, align(32))]
 pub struct Record {
     /// Least corner, then the first place in the list; greatest corner, negated, then the number of triangles. So the box
