@@ -14,7 +14,7 @@
 //!   part of the two biases.
 
 use bytemuck::{Pod, Zeroable};
-use glam::{DVec3, Vec3};
+use glam::{BVec3A, DVec3, Vec3, Vec3A, Vec3Swizzles};
 
 use crate::{
     bounds::Bounds,
@@ -178,29 +178,31 @@ impl Frame {
     }
 
     /// Become what [`Frame::new`] gives; false where there is none, and the frame is then unspecified. In place: copies
-    /// of a frame that was written number by number wait for all of the numbers.
+    /// of a frame that was written number by number wait for all of the numbers. The ray's are read one by one, since a
+    /// caller may have just written them so, and are three of a vector from then on.
     #[inline(always)]
     pub(super) fn set(&mut self, ray: &Ray, domain: &Domain) -> bool {
-        let largest = ray.direction.abs().max_element();
+        let Ray { origin, direction, tmin, tmax } = ray.read_alone();
+        let (origin, direction) = (Vec3A::from(origin), Vec3A::from(direction));
+        let largest = direction.abs().max_element();
         // Zero times anything finite is zero; times anything else it is not a number.
-        let finite = (ray.origin * 0.0 + ray.direction * 0.0).element_sum() == 0.0;
-        if !finite || largest < 1e-37 || ray.tmin.partial_cmp(&ray.tmax).is_none() {
+        let finite = (origin * 0.0 + direction * 0.0).cmpeq(Vec3A::ZERO).all();
+        if !finite || largest < 1e-37 || tmin.partial_cmp(&tmax).is_none() {
             return false;
         }
         let exponent = largest.to_bits() >> 23;
         let power = |exponent: u32| f32::from_bits(exponent << 23);
         let (scale, length) = if exponent < 254 { (power(254 - exponent), power(exponent)) } else { (0.5, 2.0) };
-        let direction = ray.direction * scale;
-        let local = ray.origin - domain.centre;
+        let local = origin - Vec3A::from(domain.centre);
         let reach = local.abs().max_element();
         if reach > NEAR * domain.half_extent {
-            self.set_from_afar(ray, direction, domain, scale);
+            self.set_from_afar(ray, domain, scale);
             return true;
         }
-        let interval = (ray.tmin * length, ray.tmax * length);
+        let interval = (tmin * length, tmax * length);
         let inverse =
-            if INVERTIBLE.contains(&largest) { inverse(ray.direction, length) } else { inverse(direction, 1.0) };
-        self.set_near(ray.origin, (local, reach), (direction, inverse), interval, domain);
+            if INVERTIBLE.contains(&largest) { inverse(direction, length) } else { inverse(direction * scale, 1.0) };
+        self.set_near(origin, (local, reach), (direction * scale, inverse), interval, domain);
         self.scale = scale;
         true
     }
@@ -210,9 +212,9 @@ impl Frame {
     #[inline(always)]
     pub(super) fn set_near(
         &mut self,
-        origin: Vec3,
-        (local, reach): (Vec3, f32),
-        (direction, inverse): (Vec3, Vec3),
+        origin: Vec3A,
+        (local, reach): (Vec3A, f32),
+        (direction, inverse): (Vec3A, Vec3A),
         (tmin, tmax): (f32, f32),
         domain: &Domain,
     ) {
@@ -221,19 +223,21 @@ impl Frame {
         self.inverse = inverse.to_array();
         self.near_bias = (bias - slack).to_array();
         self.far_bias = (bias + slack).to_array();
+        self.local = local.to_array();
         self.tmin = tmin;
         self.tmax = tmax;
         self.found = Found { low: tmax, primitive: MISS };
-        self.local = local.to_array();
-        self.advance = 0.0;
-        self.direction = direction.to_array();
-        self.axes = dominant_last(direction);
-        self.scale = 1.0;
-        let [x, y, steepest] = self.axes.map(|axis| axis as usize);
         self.origin = origin.to_array();
-        self.depth = direction[steepest];
-        self.steepness = self.inverse[steepest];
-        self.shear = [self.direction[x] * self.steepness, self.direction[y] * self.steepness];
+        self.direction = direction.to_array();
+        let dominant = Dominant::of(direction);
+        self.axes = dominant.axes();
+        let direction = dominant.last(direction);
+        self.depth = direction.z;
+        self.steepness = dominant.last(inverse).z;
+        let shear = direction * self.steepness;
+        self.shear = [shear.x, shear.y];
+        self.scale = 1.0;
+        self.advance = 0.0;
     }
 
     /// Become the frame of a ray whose origin is far, begun two half extents before the closest approach to the scene's
@@ -241,16 +245,19 @@ impl Frame {
     /// extents of the centre; of one that does not, the interval is made empty.
     #[cold]
     #[inline(never)]
-    fn set_from_afar(&mut self, ray: &Ray, direction: Vec3, domain: &Domain, scale: f32) {
+    fn set_from_afar(&mut self, ray: &Ray, domain: &Domain, scale: f32) {
+        let direction = ray.direction * scale;
         let (o, d) = (ray.origin.as_dvec3(), direction.as_dvec3());
         let to_centre: DVec3 = domain.centre.as_dvec3() - o;
         let advance = to_centre.dot(d) / d.length_squared() - 2.0 * f64::from(domain.half_extent) / d.length();
-        let origin = (o + d * advance).as_vec3();
-        let local = origin - domain.centre;
+        let direction = Vec3A::from(direction);
+        let origin = (o + d * advance).as_vec3a();
+        let local = origin - Vec3A::from(domain.centre);
         let reach = local.abs().max_element();
         if reach > NEAR * domain.half_extent {
             let nowhere = (f32::INFINITY, f32::NEG_INFINITY);
-            self.set_near(domain.centre, (Vec3::ZERO, 0.0), (direction, inverse(direction, 1.0)), nowhere, domain);
+            let centre = domain.centre.into();
+            self.set_near(centre, (Vec3A::ZERO, 0.0), (direction, inverse(direction, 1.0)), nowhere, domain);
             return;
         }
         let shifted = |t: f32| (f64::from(t) / f64::from(scale) - advance) as f32;
@@ -320,17 +327,39 @@ fn parameter(t: f32, scale: f32, advance: f64) -> f32 {
 /// The inverse of a direction over a power of two, `length`: its own inverse times that, to the bit, where neither over-
 /// nor underflows. So the division begins before the length is known; everything waits for it.
 #[inline(always)]
-pub(super) fn inverse(direction: Vec3, length: f32) -> Vec3 {
-    let parallel = direction.abs().cmplt(Vec3::splat(PARALLEL * length));
-    Vec3::select(parallel, Vec3::splat(1.0 / PARALLEL).copysign(direction), direction.recip() * length)
+pub(super) fn inverse(direction: Vec3A, length: f32) -> Vec3A {
+    let parallel = direction.abs().cmplt(Vec3A::splat(PARALLEL * length));
+    Vec3A::select(parallel, Vec3A::splat(1.0 / PARALLEL).copysign(direction), direction.recip() * length)
 }
 
-/// Sheared z is the axis along which the ray is steepest. Without branches: which axis it is cannot be predicted.
-#[inline(always)]
-fn dominant_last(direction: Vec3) -> [u32; 3] {
-    let a = direction.abs();
-    let x = (a.x >= a.y) & (a.x >= a.z);
-    let last = if x { 0 } else { 2 - u32::from(a.y >= a.z) };
-    const AXES: &[[u32; 3]; 3] = &[[1, 2, 0], [2, 0, 1], [0, 1, 2]];
-    AXES[last as usize]
+/// Along which axis a direction is steepest, the first of several. Without branches: which axis it is cannot be
+/// predicted.
+struct Dominant {
+    /// All of x, or all of y.
+    is: [BVec3A; 2],
+    axis: u32,
+}
+
+impl Dominant {
+    #[inline(always)]
+    fn of(direction: Vec3A) -> Self {
+        let size = direction.abs();
+        let greatest = Vec3A::splat(size.max_element());
+        let axis = size.cmpge(greatest).bitmask().trailing_zeros();
+        let of_x = size.xxx().cmpge(greatest);
+        Self { is: [of_x, size.yyy().cmpge(greatest)], axis }
+    }
+
+    /// A vector's components so that the one of this axis is z, in cyclic order.
+    #[inline(always)]
+    fn last(&self, v: Vec3A) -> Vec3A {
+        Vec3A::select(self.is[0], v.yzx(), Vec3A::select(self.is[1], v.zxy(), v))
+    }
+
+    /// The axes in that order.
+    #[inline(always)]
+    fn axes(&self) -> [u32; 3] {
+        const AXES: &[[u32; 3]; 4] = &[[1, 2, 0], [2, 0, 1], [0, 1, 2], [0, 1, 2]];
+        AXES[(self.axis & 3) as usize]
+    }
 }

@@ -84,7 +84,7 @@ impl<const ANY: bool> One<'_, ANY> {
     fn each<S: Simd, const GRIDS: bool>(self, simd: S) -> Hit {
         let &Scene { structure, mesh, view, .. } = self.scene;
         let mut frame = Frame::zeroed();
-        if !frame.set(&self.ray.read_alone(), &structure.domain) {
+        if !frame.set(self.ray, &structure.domain) {
             return Hit { t: f32::NAN, ..Hit::MISS };
         }
         let scene = (structure, view);

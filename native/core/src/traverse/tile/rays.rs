@@ -1,7 +1,7 @@
 //! The rays of a tile: gathering them from a batch, and what is known of each.
 
 use bytemuck::Zeroable;
-use glam::Vec3;
+use glam::{Vec3, Vec3A};
 
 use super::{BLOCKS, EXTENTS, GROUPS, RAYS, Slack, spans::Spans};
 use crate::{
@@ -207,10 +207,10 @@ impl Tile {
     /// The frame of a ray.
     pub fn frame(&self, group: usize, lane: usize) -> Frame {
         let Exactly { direction, interval: [tmin, tmax], scale } = &self.exactly[group];
-        let direction = Vec3::from_array(direction.map(|axis| axis[lane]));
+        let direction = Vec3A::from_array(direction.map(|axis| axis[lane]));
         let interval = (tmin[lane], tmax[lane]);
         let mut frame = Frame::zeroed();
-        let (origin, place) = (Vec3::from(self.origin), (self.local, self.reach));
+        let (origin, place) = (Vec3A::from(self.origin), (self.local.into(), self.reach));
         frame.set_near(origin, place, (direction, frame::inverse(direction, 1.0)), interval, &self.domain);
         frame.scale = scale[lane];
         frame
