@@ -345,15 +345,6 @@ impl Eight {
     /// Nothing was hit.
     pub const MISSES: Self =
         Self { t: [f32::INFINITY; LANES], primitive: [MISS; LANES], u: [0.0; LANES], v: [0.0; LANES] };
-
-    /// Write one hit.
-    #[inline(always)]
-    pub fn set(&mut self, lane: usize, hit: Hit) {
-        self.t[lane] = hit.t;
-        self.primitive[lane] = hit.primitive;
-        self.u[lane] = hit.u;
-        self.v[lane] = hit.v;
-    }
 }
 
 /// One hit.

@@ -165,28 +165,42 @@ struct Sheared<S: Simd> {
 impl<S: Simd> Sheared<S> {
     #[inline(always)]
     fn new(simd: S, frames: &Frames<S>) -> Self {
-        let [x, y, z] = frames.direction;
-        let size = [simd.abs(x), simd.abs(y), simd.abs(z)];
-        let greatest = simd.max(simd.max(size[1], size[2]), size[0]);
-        let sizes = [size[0], greatest, size[1], size[2]];
-        let axes = in_order(simd, sizes, [bits(simd, 0), bits(simd, 1), bits(simd, 2)]);
-        let direction = in_order(simd, sizes, frames.direction);
-        let steepness = choose(simd, sizes, frames.inverse);
+        let steepest = Steepest::of(simd, frames.direction);
+        let axes = steepest.last(simd, [bits(simd, 0), bits(simd, 1), bits(simd, 2)]);
+        let direction = steepest.last(simd, frames.direction);
+        let steepness = steepest.choose(simd, frames.inverse);
         let shear = [simd.mul(direction[0], steepness), simd.mul(direction[1], steepness)];
         Self { axes, depth: direction[2], steepness, shear }
     }
 }
 
-/// In the order of the axes of the sheared space.
-#[inline(always)]
-fn in_order<S: Simd>(simd: S, sizes: [S::F32; 4], [x, y, z]: [S::F32; 3]) -> [S::F32; 3] {
-    [choose(simd, sizes, [y, z, x]), choose(simd, sizes, [z, x, y]), choose(simd, sizes, [x, y, z])]
+/// Along which axis rays are steepest, the first of several.
+pub struct Steepest<S: Simd> {
+    x: S::F32,
+    greatest: S::F32,
+    y: S::F32,
+    z: S::F32,
 }
 
-/// The first where the size of x is the greatest, else the second where that of y is at least that of z, else the third.
-#[inline(always)]
-fn choose<S: Simd>(simd: S, [x, greatest, y, z]: [S::F32; 4], [of_x, of_y, of_z]: [S::F32; 3]) -> S::F32 {
-    simd.if_ge(x, greatest, of_x, simd.if_ge(y, z, of_y, of_z))
+impl<S: Simd> Steepest<S> {
+    /// For rays of some directions.
+    #[inline(always)]
+    pub fn of(simd: S, [x, y, z]: [S::F32; 3]) -> Self {
+        let (x, y, z) = (simd.abs(x), simd.abs(y), simd.abs(z));
+        Self { x, greatest: simd.max(simd.max(y, z), x), y, z }
+    }
+
+    /// Vectors' components so that the one of this axis is the last, in cyclic order.
+    #[inline(always)]
+    pub fn last(&self, simd: S, [x, y, z]: [S::F32; 3]) -> [S::F32; 3] {
+        [self.choose(simd, [y, z, x]), self.choose(simd, [z, x, y]), self.choose(simd, [x, y, z])]
+    }
+
+    /// The component of this axis.
+    #[inline(always)]
+    fn choose(&self, simd: S, [of_x, of_y, of_z]: [S::F32; 3]) -> S::F32 {
+        simd.if_ge(self.x, self.greatest, of_x, simd.if_ge(self.y, self.z, of_y, of_z))
+    }
 }
 
 #[inline(always)]

@@ -14,6 +14,7 @@ use crate::{
         kernel::{self, Entry},
         leaf::{Best, Search},
         probe::Silent,
+        setup::Steepest,
     },
     triangle::{self, Block, LANES},
 };
@@ -33,10 +34,7 @@ impl Tile {
         block: &Block,
         triangle: usize,
     ) -> bool {
-        if self.slanted >> group & 1 == 1 {
-            return self.decide_one_by_one(mesh, group, lanes, block, triangle);
-        }
-        let corners = self.repeated(simd, block.corners(triangle).each_ref());
+        let corners = self.repeated(simd, self.order(group), block.corners(triangle).each_ref());
         let (mut nearer, mut unclear) = (false, 0);
         for first in [0, LANES] {
             let lanes = lanes >> first & 0xff;
@@ -57,13 +55,36 @@ impl Tile {
         nearer | (unclear != 0 && self.decide_one_by_one(mesh, group, unclear, block, triangle))
     }
 
-    /// The exact test of eight rays, from `first` on, of a group that is not slanted.
+    /// The order of axes in which [`Self::exact`] takes the corners for a group: the tile's, or, where each ray has its
+    /// own, that of the mesh.
+    fn order(&self, group: usize) -> [usize; 3] {
+        if self.slanted >> group & 1 == 1 { [0, 1, 2] } else { self.axes }
+    }
+
+    /// The exact test of eight rays, from `first` on, of a group.
     #[inline(always)]
     fn exact<S: Simd>(&self, simd: S, group: usize, first: usize, corners: &[[S::F32; 3]; 3]) -> Exact<S> {
+        if self.slanted >> group & 1 == 1 {
+            return self.exact_slanted(simd, group, first, corners);
+        }
         let [x, y] = &self.groups[group].slope;
         let depth = &self.exactly[group].direction[self.axes[2]];
         let shear = [simd.load(eight(x, first)), simd.load(eight(y, first))];
         Exact::new(simd, corners, shear, simd.load(eight(depth, first)))
+    }
+
+    /// The same where every ray has an order of axes of its own.
+    #[inline(always)]
+    fn exact_slanted<S: Simd>(&self, simd: S, group: usize, first: usize, corners: &[[S::F32; 3]; 3]) -> Exact<S> {
+        let [x, y, z] = &self.exactly[group].direction;
+        let direction = [simd.load(eight(x, first)), simd.load(eight(y, first)), simd.load(eight(z, first))];
+        let steepest = Steepest::of(simd, direction);
+        let [across, along, depth] = steepest.last(simd, direction);
+        let inverse = simd.div(simd.splat(1.0), depth);
+        let shear = [simd.mul(across, inverse), simd.mul(along, inverse)];
+        let [a, b, c] = *corners;
+        let corners = [steepest.last(simd, a), steepest.last(simd, b), steepest.last(simd, c)];
+        Exact::new(simd, &corners, shear, depth)
     }
 
     #[cold]
@@ -160,21 +181,8 @@ impl Tile {
         // Of all these bits, those of MISS alone are not a number.
         let best = simd.load(eight(&self.groups[group].best, first));
         let met = simd.le(best, best);
-        if met != 0 && self.slanted >> group & 1 == 1 {
-            self.set_one_by_one(mesh, group, first, hits);
-        } else if met != 0 {
+        if met != 0 {
             self.set_together(simd, mesh, (group, first), met, hits);
-        }
-    }
-
-    #[inline(never)]
-    fn set_one_by_one(&self, mesh: &Mesh, group: usize, first: usize, hits: &mut Eight) {
-        for lane in 0..LANES {
-            let frame = self.frame(group, first + lane);
-            let hit = self.best(mesh, group, first + lane, &frame);
-            if hit.primitive != MISS {
-                hits.set(lane, Hit { t: frame.parameter(hit.t), ..hit });
-            }
         }
     }
 
@@ -189,11 +197,11 @@ impl Tile {
         for triangle in triangles {
             differ |= triangle ^ any.to_bits();
         }
-        let mesh = mesh.reader();
+        let (mesh, order) = (mesh.reader(), self.order(group));
         let corners = if differ == 0 {
-            self.repeated(simd, mesh.places(any.to_bits()))
+            self.repeated(simd, order, mesh.places(any.to_bits()))
         } else {
-            self.gathered(simd, mesh, &triangles)
+            self.gathered(simd, order, mesh, &triangles)
         };
         let exact = self.exact(simd, group, start, &corners);
         let t = simd.mul(exact.t, simd.load(eight(&self.exactly[group].scale, start)));
@@ -203,9 +211,15 @@ impl Tile {
         hits.v = simd.store(simd.if_ge(best, zero, exact.v, zero));
     }
 
-    /// Corners of eight triangles relative to the origin, in the order of the tile's axes.
+    /// Corners of eight triangles relative to the origin, in an order of axes.
     #[inline(always)]
-    fn gathered<S: Simd>(&self, simd: S, mesh: Reader<'_>, triangles: &[u32; LANES]) -> [[S::F32; 3]; 3] {
+    fn gathered<S: Simd>(
+        &self,
+        simd: S,
+        order: [usize; 3],
+        mesh: Reader<'_>,
+        triangles: &[u32; LANES],
+    ) -> [[S::F32; 3]; 3] {
         let [mut first, mut last] = [[simd.splat(0.0); LANES]; 2];
         for lane in 0..LANES {
             let [a, b, c] = mesh.rows(triangles[lane]);
@@ -217,20 +231,20 @@ impl Tile {
         let mut relative = places;
         for c in 0..3 {
             for k in 0..3 {
-                let axis = self.axes[k];
+                let axis = order[k];
                 relative[c][k] = simd.sub(places[c][axis], simd.splat(self.origin[axis]));
             }
         }
         relative
     }
 
-    /// Corners of one triangle relative to the origin, in the order of the tile's axes, in every lane.
+    /// Corners of one triangle relative to the origin, in an order of axes, in every lane.
     #[inline(always)]
-    fn repeated<S: Simd>(&self, simd: S, corners: [&[f32; 3]; 3]) -> [[S::F32; 3]; 3] {
+    fn repeated<S: Simd>(&self, simd: S, order: [usize; 3], corners: [&[f32; 3]; 3]) -> [[S::F32; 3]; 3] {
         let mut relative = [[simd.splat(0.0); 3]; 3];
         for c in 0..3 {
             for k in 0..3 {
-                let axis = self.axes[k];
+                let axis = order[k];
                 relative[c][k] = simd.splat(corners[c][axis] - self.origin[axis]);
             }
         }
