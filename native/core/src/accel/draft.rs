@@ -36,6 +36,11 @@ impl Draft {
     pub const EMPTY: Self =
         Self { nodes: Vec::new(), leaves: Vec::new(), root: NodeRef::EMPTY, stack_size: 0, triangles: 0 };
 
+    /// Nothing, with room for the nodes and leaves that so many triangles usually need: to grow, all would be copied.
+    pub fn for_triangles(count: usize) -> Self {
+        Self { nodes: Vec::with_capacity(count / 16), leaves: Vec::with_capacity(count / 4), ..Self::EMPTY }
+    }
+
     /// Forget everything but the room.
     pub fn clear(&mut self) {
         self.nodes.clear();

@@ -27,7 +27,7 @@ pub fn plan(keys: &[Key], leaf_size: usize, job: &Job) -> Result<(Top, Vec<Draft
     }
     let drafts = subtrees.into_par_iter().map(|range| {
         job.check()?;
-        let mut draft = Draft::default();
+        let mut draft = Draft::for_triangles(range.len());
         (draft.root, draft.stack_size) = curve.subtree(range, &mut draft);
         job.advance(draft.triangles as u64);
         Ok(draft)
