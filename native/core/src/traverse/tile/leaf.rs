@@ -84,7 +84,8 @@ impl Planes {
         }
     }
 
-    /// The triangles that may be met by some ray with slopes between those of a group.
+    /// The triangles that may be met by some ray with slopes between those of a group. Those behind the group's farthest
+    /// hit are not told apart: to find each triangle's nearest corner and compare it took 1.02 times as long (Zen 4).
     #[inline(always)]
     fn near<S: Simd>(&self, simd: S, tile: &Tile, group: usize) -> u32 {
         let (spans, group) = (&tile.spans[group / LANES], group % LANES);

@@ -175,7 +175,8 @@ impl Tile {
     }
 
     /// Write the best hits of eight rays of a group, from `first` on, in the rays' own units, over misses. To return them
-    /// would copy them by vectors wider than those they were written by.
+    /// would copy them by vectors wider than those they were written by. Asking for triangles two groups ahead, as streams
+    /// do, took 1/1.1 of the time where they miss every cache (soup, dragon), and up to 1.04 times as long elsewhere.
     #[inline(always)]
     pub fn hits<S: Simd>(&self, simd: S, mesh: &Mesh, group: usize, first: usize, hits: &mut Eight) {
         // Of all these bits, those of MISS alone are not a number.
