@@ -2,9 +2,9 @@
 //! fast Construction of SAH-based Bounding Volume Hierarchies", RT 2007. As for
 //! [`BinnedSah`](super::sah::BinnedSah), the cost of a side is its area times the blocks it would fill.
 
-use glam::Vec3A;
+use glam::{Mat4, Vec3A, Vec4};
 
-use super::record::{Record, half_area};
+use super::record::{Record, half_area, halves};
 use crate::{bounds::BoundsA, simd::Simd, triangle::LANES};
 
 /// Most bins along an axis.
@@ -108,10 +108,41 @@ impl Side {
     }
 }
 
-/// Expected work, up to a constant; not a number where there are no triangles.
-#[inline(always)]
-fn cost(row: &[f32; LANES], count: u32) -> f32 {
-    half_area(row) * count.div_ceil(LANES as u32) as f32
+/// What lies on one side of a plane, along each of the three axes.
+#[derive(Debug, Clone, Copy)]
+struct Swept {
+    lower: [Vec4; 3],
+    upper: [Vec4; 3],
+    counts: [u32; 4],
+}
+
+impl Swept {
+    const EMPTY: Self = Self { lower: [Vec4::INFINITY; 3], upper: [Vec4::INFINITY; 3], counts: [0; 4] };
+
+    #[inline(always)]
+    fn add(&mut self, rows: &[[f32; LANES]; 3], counts: &[u32; 4]) {
+        for axis in 0..3 {
+            let [lower, upper] = halves(&rows[axis]);
+            (self.lower[axis], self.upper[axis]) = (self.lower[axis].min(lower), self.upper[axis].min(upper));
+        }
+        for axis in 0..4 {
+            self.counts[axis] += counts[axis];
+        }
+    }
+
+    /// Expected work by axis, up to a constant; not a number where there are no triangles, and behind the last axis.
+    #[inline(always)]
+    fn cost(&self) -> Vec4 {
+        let (lower, upper) = (&self.lower, &self.upper);
+        let extents = [lower[0] + upper[0], lower[1] + upper[1], lower[2] + upper[2]];
+        let Mat4 { x_axis: x, y_axis: y, z_axis: z, .. } =
+            Mat4::from_cols(extents[0], extents[1], extents[2], Vec4::INFINITY).transpose();
+        let mut blocks = [0.0; 4];
+        for axis in 0..4 {
+            blocks[axis] = ((self.counts[axis] + LANES as u32 - 1) >> LANES.ilog2()) as i32 as f32;
+        }
+        (x * (y + z) + y * z) * Vec4::from_array(blocks)
+    }
 }
 
 /// Bins of records along all axes, reused from node to node.
@@ -119,20 +150,20 @@ fn cost(row: &[f32; LANES], count: u32) -> f32 {
 #[repr(C, align(32))]
 pub struct Bins {
     rows: [[[f32; LANES]; 3]; MOST],
-    counts: [[u32; 3]; MOST],
+    counts: [[u32; 4]; MOST],
     used: usize,
 }
 
 impl Bins {
     /// Nothing in them.
-    pub const EMPTY: Self = Self { rows: [[Record::NONE.row; 3]; MOST], counts: [[0; 3]; MOST], used: MOST };
+    pub const EMPTY: Self = Self { rows: [[Record::NONE.row; 3]; MOST], counts: [[0; 4]; MOST], used: MOST };
 
     /// Put records into `used` bins along every axis.
     #[inline(always)]
     pub fn fill<S: Simd>(&mut self, simd: S, records: &[Record], mapping: &Mapping, used: usize) {
         self.used = used;
         self.rows[..used].fill([Record::NONE.row; 3]);
-        self.counts[..used].fill([0; 3]);
+        self.counts[..used].fill([0; 4]);
         for record in records {
             let (places, row, count) = (mapping.bins(record), simd.load(&record.row), record.count());
             for axis in 0..3 {
@@ -157,18 +188,21 @@ impl Bins {
     /// The cheapest plane with records on both of its sides: a side without triangles has infinite extents and no
     /// blocks, so that its cost is not a number, and less than none.
     #[inline(always)]
-    pub fn cheapest<S: Simd>(&self, simd: S) -> Option<Plane> {
-        let right_costs = self.right_costs(simd);
-        let mut best = Plane { axis: 0, bin: 0, cost: f32::INFINITY };
-        let (mut left, mut counts) = ([simd.splat(f32::INFINITY); 3], [0; 3]);
+    pub fn cheapest(&self) -> Option<Plane> {
+        let right_costs = self.right_costs();
+        let (mut left, mut least, mut bins) = (Swept::EMPTY, Vec4::INFINITY, Vec4::ZERO);
         for bin in 1..self.used {
-            for axis in 0..3 {
-                left[axis] = simd.min(left[axis], simd.load(&self.rows[bin - 1][axis]));
-                counts[axis] += self.counts[bin - 1][axis];
-                let cost = cost(&simd.store(left[axis]), counts[axis]) + right_costs[bin][axis];
-                if cost < best.cost {
-                    best = Plane { axis, bin, cost };
-                }
+            left.add(&self.rows[bin - 1], &self.counts[bin - 1]);
+            let cost = left.cost() + right_costs[bin];
+            let is_less = cost.cmplt(least);
+            least = Vec4::select(is_less, cost, least);
+            bins = Vec4::select(is_less, Vec4::splat(bin as f32), bins);
+        }
+        let mut best = Plane { axis: 0, bin: 0, cost: f32::INFINITY };
+        for axis in 0..3 {
+            let plane = Plane { axis, bin: bins[axis] as usize, cost: least[axis] };
+            if plane.cost < best.cost || plane.cost == best.cost && plane.bin < best.bin {
+                best = plane;
             }
         }
         (best.bin > 0).then_some(best)
@@ -176,26 +210,27 @@ impl Bins {
 
     /// The cost of what lies from each bin on.
     #[inline(always)]
-    fn right_costs<S: Simd>(&self, simd: S) -> [[f32; 3]; MOST] {
-        let mut costs = [[0.0; 3]; MOST];
-        let (mut right, mut counts) = ([simd.splat(f32::INFINITY); 3], [0; 3]);
+    fn right_costs(&self) -> [Vec4; MOST] {
+        let (mut costs, mut right) = ([Vec4::ZERO; MOST], Swept::EMPTY);
         for bin in (1..self.used).rev() {
-            for axis in 0..3 {
-                right[axis] = simd.min(right[axis], simd.load(&self.rows[bin][axis]));
-                counts[axis] += self.counts[bin][axis];
-                costs[bin][axis] = cost(&simd.store(right[axis]), counts[axis]);
-            }
+            right.add(&self.rows[bin], &self.counts[bin]);
+            costs[bin] = right.cost();
         }
         costs
     }
 
     /// What lies on either side of a plane.
     #[inline(always)]
-    pub fn sides(&self, plane: &Plane) -> [Side; 2] {
-        let mut sides = [Side::EMPTY; 2];
-        for bin in 0..self.used {
-            sides[usize::from(bin >= plane.bin)].add(&self.rows[bin][plane.axis], self.counts[bin][plane.axis]);
+    pub fn sides<S: Simd>(&self, simd: S, plane: &Plane) -> [Side; 2] {
+        let (mut rows, mut counts) = ([simd.splat(f32::INFINITY); 2], [0; 2]);
+        for bin in 0..plane.bin {
+            rows[0] = simd.min(rows[0], simd.load(&self.rows[bin][plane.axis]));
+            counts[0] += self.counts[bin][plane.axis];
         }
-        sides
+        for bin in plane.bin..self.used {
+            rows[1] = simd.min(rows[1], simd.load(&self.rows[bin][plane.axis]));
+            counts[1] += self.counts[bin][plane.axis];
+        }
+        [Side { row: simd.store(rows[0]), count: counts[0] }, Side { row: simd.store(rows[1]), count: counts[1] }]
     }
 }

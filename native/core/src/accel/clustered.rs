@@ -30,8 +30,12 @@ pub fn plan(clusters: &Clusters, leaf_size: usize, job: &Job) -> Result<(Top, Ve
     }
     let drafts = subtrees.into_par_iter().map_init(Planner::default, |planner, cells| {
         job.check()?;
-        let mut draft = Draft::default();
-        let expand = |records: &mut Vec<Record>| cells.iter().for_each(|cell| clusters.expand(cell, records));
+        let count = cells.iter().map(|cell| cell.count() as usize).sum();
+        let mut draft = Draft::for_triangles(count);
+        let expand = |records: &mut Vec<Record>| {
+            records.reserve(count / 2);
+            cells.iter().for_each(|cell| clusters.expand(cell, records));
+        };
         planner.plan(expand, &clusters.triangles, leaf_size, &mut draft)?;
         job.advance(draft.triangles as u64);
         Ok(draft)

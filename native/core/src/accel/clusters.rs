@@ -97,13 +97,14 @@ impl Clusters {
     /// Add the clusters of a cell.
     #[inline(always)]
     pub fn expand(&self, cell: &Record, clusters: &mut Vec<Record>) {
-        let (first, mut left) = (cell.range().start, cell.count());
-        let mut following = self.chunks[first / CHUNK].clusters[first % CHUNK..].iter();
-        while left > 0 {
-            let Some(cluster) = following.next() else { break };
-            clusters.push(*cluster);
-            left -= cluster.count();
+        let first = cell.range().start;
+        let following = &self.chunks[first / CHUNK].clusters[first % CHUNK..];
+        let (mut count, mut left) = (0, cell.count());
+        while left > 0 && count < following.len() {
+            left -= following[count].count();
+            count += 1;
         }
+        clusters.extend_from_slice(&following[..count]);
     }
 }
 
@@ -133,11 +134,12 @@ impl Clusterer<'_> {
         for (most, growth) in ROUNDS {
             neighbours.find(records, self.level);
             records.clear();
-            merge(neighbours, most.min(self.most), growth, order, triangles, records);
+            let most = most.min(self.most);
+            self.level.run(Merge { neighbours, most, growth, order, triangles, clusters: records });
             order.copy_from_slice(triangles);
         }
         let clusters: Vec<Record> = records.iter().map(|record| record.at(first + record.range().start)).collect();
-        let cells = cells(first, &clusters);
+        let cells = self.level.run(Group { first, clusters: &clusters });
         Chunk { clusters, cells }
     }
 }
@@ -158,6 +160,7 @@ impl Kernel for Fetch<'_> {
         let Self { mesh, cube, triangles, records } = self;
         let reader = mesh.reader();
         records.clear();
+        records.reserve(triangles.len());
         for (index, &triangle) in triangles.iter().enumerate() {
             ahead::ask(simd, reader, index, |place| triangles.get(place).copied());
             records.push(Record::new(&cube.bounds(reader.corners(triangle)), index, 1));
@@ -165,68 +168,87 @@ impl Kernel for Fetch<'_> {
     }
 }
 
-/// Merge what is nearest to each other; triangles move so that those of a cluster stay together.
-fn merge(
-    neighbours: &Neighbours,
+/// Merges what is nearest to each other; triangles move so that those of a cluster stay together.
+struct Merge<'a> {
+    neighbours: &'a Neighbours,
     most: u32,
     growth: f32,
-    order: &[u32],
-    triangles: &mut [u32],
-    clusters: &mut Vec<Record>,
-) {
-    let mut filled = 0;
-    for (index, record) in neighbours.records().iter().enumerate() {
-        let place = filled;
-        let mut take = |record: &Record| {
-            for triangle in record.range() {
-                triangles[filled] = order[triangle];
-                filled += 1;
-            }
-        };
-        match partner(neighbours, index, most, growth) {
-            Some(partner) if partner < index => {}
-            Some(partner) => {
-                let other = &neighbours.records()[partner];
-                take(record);
-                take(other);
-                clusters.push(record.union(other, place));
-            }
-            None => {
-                take(record);
-                clusters.push(record.at(place));
+    order: &'a [u32],
+    triangles: &'a mut [u32],
+    clusters: &'a mut Vec<Record>,
+}
+
+impl Kernel for Merge<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(mut self, simd: S) {
+        let records = self.neighbours.records();
+        let mut filled = 0;
+        for (index, record) in records.iter().enumerate() {
+            let Some((partner, both)) = self.partner(simd, index) else {
+                self.clusters.push(record.at(filled));
+                filled = self.take(record, filled);
+                continue;
+            };
+            if partner > index {
+                self.clusters.push(both.at(filled));
+                filled = self.take(record, filled);
+                filled = self.take(&records[partner], filled);
             }
         }
     }
 }
 
-/// Which cluster another one is merged with.
-#[inline(always)]
-fn partner(neighbours: &Neighbours, index: usize, most: u32, growth: f32) -> Option<usize> {
-    let partner = neighbours.mutual(index)?;
-    let [one, other] = [index, partner].map(|index| &neighbours.records()[index]);
-    let both = one.union(other, 0);
-    let fit = both.count() <= most && both.half_area() <= growth * (one.half_area() + other.half_area());
-    fit.then_some(partner)
+impl Merge<'_> {
+    /// Put the triangles of a cluster where `filled` others are; returns how many are there then.
+    #[inline(always)]
+    fn take(&mut self, record: &Record, filled: usize) -> usize {
+        let (range, count) = (record.range(), record.count() as usize);
+        self.triangles[filled..filled + count].copy_from_slice(&self.order[range]);
+        filled + count
+    }
+
+    /// Which cluster another one is merged with, and both together.
+    #[inline(always)]
+    fn partner<S: Simd>(&self, simd: S, index: usize) -> Option<(usize, Record)> {
+        let partner = self.neighbours.mutual(index)?;
+        let [one, other] = [index, partner].map(|index| &self.neighbours.records()[index]);
+        let both = one.union(simd, other);
+        let fit = both.count() <= self.most && both.half_area() <= self.growth * (one.half_area() + other.half_area());
+        fit.then_some((partner, both))
+    }
 }
 
-/// Group consecutive clusters, the first of which has the number `first`.
-fn cells(first: usize, clusters: &[Record]) -> Vec<Record> {
-    let mut cells = Vec::with_capacity(clusters.len() / 2);
-    let mut begin = 0;
-    while begin < clusters.len() {
-        let (mut cell, mut area) = (clusters[begin].at(first + begin), clusters[begin].half_area());
-        let (mut least, mut end) = (area, begin + 1);
-        while end < clusters.len().min(begin + CELL) {
-            let both = cell.union(&clusters[end], first + begin);
-            let next = clusters[end].half_area();
-            (area, least) = (area + next, least.min(next));
-            if both.half_area() > (CELL_GROWTH * area).min(CELL_SHARE * least) {
-                break;
+/// Groups consecutive clusters, the first of which has the number `first`.
+struct Group<'a> {
+    first: usize,
+    clusters: &'a [Record],
+}
+
+impl Kernel for Group<'_> {
+    type Output = Vec<Record>;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> Vec<Record> {
+        let Self { first, clusters } = self;
+        let mut cells = Vec::with_capacity(clusters.len());
+        let mut begin = 0;
+        while begin < clusters.len() {
+            let (mut cell, mut area) = (clusters[begin], clusters[begin].half_area());
+            let (mut least, mut end) = (area, begin + 1);
+            while end < clusters.len().min(begin + CELL) {
+                let both = cell.union(simd, &clusters[end]);
+                let next = clusters[end].half_area();
+                (area, least) = (area + next, least.min(next));
+                if both.half_area() > (CELL_GROWTH * area).min(CELL_SHARE * least) {
+                    break;
+                }
+                (cell, end) = (both, end + 1);
             }
-            (cell, end) = (both, end + 1);
+            cells.push(cell.at(first + begin));
+            begin = end;
         }
-        cells.push(cell);
-        begin = end;
+        cells
     }
-    cells
 }

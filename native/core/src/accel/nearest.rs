@@ -12,14 +12,21 @@ pub const MOST: usize = 1024;
 /// How far to either side a box is compared with others. At most 15: see [`SIDES`].
 const REACH: usize = 15;
 
-/// Columns begin with as many entries before the first box as are read there, and end with as many behind the last.
-const ROOM: usize = 16 + MOST + 32;
+/// Boxes whose distances are known at once: few, so that they stay in the nearest cache, but enough that none is read
+/// back while it is still being written.
+const STRIP: usize = 128;
+
+/// Distances of as many boxes before the strip are known, too.
 const FRONT: usize = 16;
 
 /// The sides of a box that is near to none.
 const FAR: f32 = -1e12;
 
-type Column = [f32; ROOM];
+/// A number of every box, with as much room behind the last as is read there.
+type Column = [f32; MOST + 32];
+
+/// A number of every box of a strip, and of those before it.
+type Window = [f32; FRONT + STRIP];
 
 /// Boxes, and the distances between them.
 ///
@@ -31,8 +38,8 @@ pub struct Neighbours {
     records: Vec<Record>,
     /// By column, as in [`Record::row`].
     planes: Box<[Column; 6]>,
-    /// `distances[k][i]` is that from box `i` to box `i + k + 1`.
-    distances: Box<[Column; REACH]>,
+    /// `distances[k][FRONT + i]` is that from box `i` of the strip to the `k + 1`th after it.
+    distances: Box<[Window; REACH]>,
     least: Box<Column>,
     nearest: Vec<u16>,
 }
@@ -59,9 +66,9 @@ impl Default for Neighbours {
     fn default() -> Self {
         Self {
             records: Vec::new(),
-            planes: Box::new([[FAR; ROOM]; 6]),
-            distances: Box::new([[f32::MAX; ROOM]; REACH]),
-            least: Box::new([0.0; ROOM]),
+            planes: bytemuck::allocation::zeroed_box(),
+            distances: bytemuck::allocation::zeroed_box(),
+            least: bytemuck::allocation::zeroed_box(),
             nearest: Vec::new(),
         }
     }
@@ -77,9 +84,8 @@ impl Neighbours {
         self.records.resize(count.next_multiple_of(LANES) + 2 * LANES, Record { row: [FAR; LANES] });
         level.run(Find(self));
         self.records.truncate(count);
-        let least = &self.least[FRONT..FRONT + count];
         self.nearest.clear();
-        self.nearest.extend(least.iter().enumerate().map(|(index, least)| other(index, *least)));
+        self.nearest.extend(self.least[..count].iter().enumerate().map(|(index, least)| other(index, *least)));
     }
 
     /// The boxes.
@@ -106,7 +112,7 @@ fn other(index: usize, distance: f32) -> u16 {
 
 /// Eight entries of a column.
 #[inline(always)]
-fn at(column: &Column, first: usize) -> &[f32; LANES] {
+fn at(column: &[f32], first: usize) -> &[f32; LANES] {
     column[first..].first_chunk().unwrap_or(&[f32::MAX; LANES])
 }
 
@@ -119,16 +125,27 @@ impl Kernel for Find<'_> {
     fn run<S: Simd>(self, simd: S) {
         let Neighbours { records, planes, distances, least, .. } = self.0;
         for (index, eight) in records.as_chunks::<LANES>().0.iter().enumerate() {
-            columns(simd, eight, planes, FRONT + index * LANES);
+            columns(simd, eight, planes, index * LANES);
         }
-        let end = FRONT + records.len() - 2 * LANES;
-        for first in (FRONT..end).step_by(LANES) {
-            ahead(simd, planes, distances, least, first);
-        }
-        for first in (FRONT..end).step_by(LANES) {
-            behind(simd, distances, least, first);
+        distances.iter_mut().for_each(|window| window[..FRONT].fill(f32::MAX));
+        let end = records.len() - 2 * LANES;
+        for strip in (0..end).step_by(STRIP) {
+            let firsts = (strip..end.min(strip + STRIP)).step_by(LANES);
+            for first in firsts.clone() {
+                ahead(simd, planes, distances, least, first);
+            }
+            for first in firsts {
+                behind(simd, distances, least, first);
+            }
+            distances.iter_mut().for_each(|window| window.copy_within(STRIP.., 0));
         }
     }
+}
+
+/// Where the distances of a box are in a window.
+#[inline(always)]
+fn place(index: usize) -> usize {
+    FRONT + index % STRIP
 }
 
 /// Bring eight rows into columns.
@@ -151,10 +168,10 @@ fn columns<S: Simd>(simd: S, rows: &[Record; LANES], planes: &mut [Column; 6], f
 
 /// Distances from eight boxes to those that follow each, and the least of them.
 #[inline(always)]
-fn ahead<S: Simd>(simd: S, planes: &[Column; 6], distances: &mut [Column; REACH], least: &mut Column, first: usize) {
+fn ahead<S: Simd>(simd: S, planes: &[Column; 6], distances: &mut [Window; REACH], least: &mut Column, first: usize) {
     let own: [S::F32; 6] = std::array::from_fn(|plane| simd.load(at(&planes[plane], first)));
     let high = simd.splat(f32::from_bits(!PLACE));
-    let sides = &SIDES[(first - FRONT) / LANES % 4];
+    let sides = &SIDES[first / LANES % 4];
     let mut best = simd.splat(f32::MAX);
     for k in 0..REACH {
         let other = first + k + 1;
@@ -168,17 +185,17 @@ fn ahead<S: Simd>(simd: S, planes: &[Column; 6], distances: &mut [Column; REACH]
         let area = simd.add(simd.mul(x, simd.add(y, z)), simd.mul(y, z));
         let distance = simd.or(simd.and(area, high), simd.load(&sides[k]));
         best = simd.min(distance, best);
-        distances[k][first..first + LANES].copy_from_slice(&simd.store(distance));
+        distances[k][place(first)..][..LANES].copy_from_slice(&simd.store(distance));
     }
     least[first..first + LANES].copy_from_slice(&simd.store(best));
 }
 
 /// Let the boxes before eight boxes be their nearest, too.
 #[inline(always)]
-fn behind<S: Simd>(simd: S, distances: &[Column; REACH], least: &mut Column, first: usize) {
+fn behind<S: Simd>(simd: S, distances: &[Window; REACH], least: &mut Column, first: usize) {
     let mut best = simd.load(at(least, first));
     for k in 0..REACH {
-        best = simd.min(simd.load(at(&distances[k], first - k - 1)), best);
+        best = simd.min(simd.load(at(&distances[k], place(first) - k - 1)), best);
     }
     least[first..first + LANES].copy_from_slice(&simd.store(best));
 }
@@ -191,7 +208,8 @@ mod tests {
     use crate::bounds::BoundsA;
 
     fn distance(records: &[Record], a: usize, b: usize) -> u32 {
-        let area = records[a].union(&records[b], 0).half_area();
+        let row = std::array::from_fn(|lane| records[a].row[lane].min(records[b].row[lane]));
+        let area = Record { row }.half_area();
         area.to_bits() & !PLACE | (a ^ b) as u32 & PLACE
     }
 

@@ -123,9 +123,9 @@ fn divide<'r, S: Simd>(simd: S, set: Set<'r>, bins: &mut Bins) -> [Set<'r>; 2] {
     let plane = if set.depth < MOST_DEPTH { best_plane(simd, set.records, bins) } else { None };
     match plane {
         Some((plane, mapping)) => {
-            let middle = partition(set.records, set.spare, &plane, &mapping);
+            let middle = partition(simd, set.records, set.spare, &plane, &mapping);
             let set = Set { records: set.spare, spare: set.records, ..set };
-            set.split(middle, bins.sides(&plane))
+            set.split(middle, bins.sides(simd, &plane))
         }
         None => {
             let middle = set.records.len() / 2;
@@ -145,7 +145,7 @@ fn best_plane<S: Simd>(simd: S, records: &[Record], bins: &mut Bins) -> Option<(
     } else {
         fill_parallel(simd, records, bins, used)
     };
-    Some((bins.cheapest(simd)?, mapping))
+    Some((bins.cheapest()?, mapping))
 }
 
 fn fill_parallel<S: Simd>(simd: S, records: &[Record], bins: &mut Bins, used: usize) -> Mapping {
@@ -180,12 +180,13 @@ impl Kernel for Fill<'_> {
 /// Copy what lies before a plane to the front and the rest, backwards, to the end; returns how many went to the front.
 /// Both places are written to, so that nothing depends on a branch that nobody can predict.
 #[inline(always)]
-fn partition(from: &[Record], to: &mut [Record], plane: &Plane, mapping: &Mapping) -> usize {
+fn partition<S: Simd>(simd: S, from: &[Record], to: &mut [Record], plane: &Plane, mapping: &Mapping) -> usize {
     let (mut left, mut right) = (0, from.len());
     let (lower, scale) = mapping.along(plane.axis);
     for record in from {
-        to[left] = *record;
-        to[right - 1] = *record;
+        let row = simd.load(&record.row);
+        to[left].row = simd.store(row);
+        to[right - 1].row = simd.store(row);
         let is_left = Mapping::is_left(lower, scale, record, plane);
         left += usize::from(is_left);
         right -= usize::from(!is_left);

@@ -4,6 +4,7 @@ use glam::{Vec3, Vec3A, Vec4};
 
 use crate::{
     bounds::{Bounds, BoundsA},
+    simd::Simd,
     triangle::LANES,
 };
 
@@ -25,7 +26,7 @@ fn number(value: u32) -> f32 {
 }
 
 impl Record {
-    /// Contains nothing and is neutral under [`Record::union`].
+    /// Contains nothing.
     pub const NONE: Self = Self { row: [f32::INFINITY; LANES] };
 
     /// Of `count` triangles that are listed from `first` on.
@@ -43,11 +44,11 @@ impl Record {
         self
     }
 
-    /// The box around the triangles of both, which are listed from `first` on.
+    /// The box around the triangles of both, and how many they are; where they are listed is to be [told](Record::at).
     #[inline(always)]
-    pub fn union(&self, other: &Self, first: usize) -> Self {
-        let mut row = std::array::from_fn(|lane| self.row[lane].min(other.row[lane]));
-        (row[3], row[7]) = (number(first as u32), number(self.count() + other.count()));
+    pub fn union<S: Simd>(&self, simd: S, other: &Self) -> Self {
+        let mut row = simd.store(simd.min(simd.load(&self.row), simd.load(&other.row)));
+        row[7] = number(self.count() + other.count());
         Self { row }
     }
 
@@ -60,8 +61,7 @@ impl Record {
 
     #[inline(always)]
     fn corners(&self) -> [Vec4; 2] {
-        let [a, b, c, d, e, f, g, h] = self.row;
-        [Vec4::new(a, b, c, d), Vec4::new(e, f, g, h)]
+        halves(&self.row)
     }
 
     /// Twice the middle of the box.
@@ -95,6 +95,12 @@ impl Record {
     pub fn count(&self) -> u32 {
         self.row[7].to_bits() ^ NUMBER
     }
+}
+
+/// The four numbers of either corner in a [`Record::row`].
+#[inline(always)]
+pub fn halves(row: &[f32; LANES]) -> [Vec4; 2] {
+    [Vec4::from_slice(&row[..4]), Vec4::from_slice(&row[4..])]
 }
 
 /// Half the surface area of the box in a [`Record::row`].
