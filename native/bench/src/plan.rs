@@ -19,7 +19,7 @@ pub struct Plan {
     pub threads: usize,
     /// Instruction set of both sides; each side's best where absent.
     pub isa: Option<String>,
-    /// Most rounds of a race.
+    /// Rounds of a race; short ones have more.
     pub rounds: usize,
     /// A race ends after the round in which this much time has passed, but not before its third.
     pub seconds: f64,

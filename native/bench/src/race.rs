@@ -31,7 +31,7 @@ pub struct Contender<'a> {
 /// How long a race lasts.
 #[derive(Debug, Clone, Copy)]
 pub struct Length {
-    /// Most rounds.
+    /// How many rounds; if several, more of them until [`Length::SHORT`] is over.
     pub rounds: usize,
     /// It ends after the round in which this much time has passed, but not before round [`Length::LEAST`].
     pub time: Duration,
@@ -42,6 +42,15 @@ pub struct Length {
 
 impl Length {
     const LEAST: usize = 3;
+
+    /// What takes less than a millisecond needs many rounds until its code and its memory are where they will be, on
+    /// either side.
+    const SHORT: Duration = Duration::from_secs(1);
+
+    fn is_over(&self, rounds: usize, time: Duration) -> bool {
+        let is_short = self.rounds > 1 && time < Self::SHORT;
+        (rounds >= self.rounds && !is_short) || (rounds >= Self::LEAST && time > self.time)
+    }
 }
 
 /// After the first two rounds, ways of Embree this much slower than the fastest leave the race.
@@ -55,8 +64,8 @@ pub fn race(field: Vec<(Side, Run<'_>)>, length: Length) -> Result<Vec<Contender
     let contender = |(side, run)| Contender { side, best: Duration::MAX, run, is_out: false };
     let mut field: Vec<_> = field.into_iter().map(contender).collect();
     let start = Instant::now();
-    for round in 0..length.rounds {
-        if round >= Length::LEAST && start.elapsed() > length.time {
+    for round in 0.. {
+        if length.is_over(round, start.elapsed()) {
             break;
         }
         for contender in field.iter_mut().filter(|contender| !contender.is_out) {
