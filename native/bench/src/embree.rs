@@ -7,6 +7,7 @@
 
 use std::{
     ffi::{CStr, CString, c_char, c_int, c_uint, c_void},
+    mem::ManuallyDrop,
     path::Path,
     ptr::null_mut,
     sync::atomic::{AtomicIsize, Ordering::Relaxed},
@@ -79,14 +80,16 @@ macro_rules! functions {
         #[allow(non_snake_case)] // The library's own names.
         struct Functions {
             $($name: $type,)+
-            _library: Library,
         }
 
         impl Functions {
+            /// The library stays until the process ends: a thread of its TBB that has nothing left to do ends when it
+            /// likes, by the library's code.
             fn load(library: Library) -> Result<Self, libloading::Error> {
-                // SAFETY: each type is that of the function's declaration in Embree 4's headers, and the pointers
-                // live no longer than the library, which is kept beside them.
-                unsafe { Ok(Self { $($name: *library.get(stringify!($name).as_bytes())?,)+ _library: library }) }
+                let library = ManuallyDrop::new(library);
+                // SAFETY: each type is that of the function's declaration in Embree 4's headers, and the library is
+                // never closed.
+                unsafe { Ok(Self { $($name: *library.get(stringify!($name).as_bytes())?,)+ }) }
             }
         }
     };
