@@ -164,13 +164,23 @@ impl Bins {
         self.used = used;
         self.rows[..used].fill([Record::NONE.row; 3]);
         self.counts[..used].fill([0; 4]);
-        for record in records {
-            let (places, row, count) = (mapping.bins(record), simd.load(&record.row), record.count());
-            for axis in 0..3 {
-                let bin = &mut self.rows[places[axis]][axis];
-                *bin = simd.store(simd.min(simd.load(bin), row));
-                self.counts[places[axis]][axis] += count;
-            }
+        let (first, second) = records.split_at(records.len() / 2);
+        for (one, other) in first.iter().zip(second) {
+            self.add(simd, one, mapping);
+            self.add(simd, other, mapping);
+        }
+        for record in &second[first.len()..] {
+            self.add(simd, record, mapping);
+        }
+    }
+
+    #[inline(always)]
+    fn add<S: Simd>(&mut self, simd: S, record: &Record, mapping: &Mapping) {
+        let (places, row, count) = (mapping.bins(record), simd.load(&record.row), record.count());
+        for axis in 0..3 {
+            let bin = &mut self.rows[places[axis]][axis];
+            *bin = simd.store(simd.min(simd.load(bin), row));
+            self.counts[places[axis]][axis] += count;
         }
     }
 

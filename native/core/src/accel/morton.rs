@@ -94,8 +94,8 @@ pub fn key(corners: [Vec3A; 3], cube: &UnitCube, triangle: u32) -> Key {
     let bounds = cube.bounds(corners);
     let place = (bounds.lower + bounds.upper) * (BUCKETS / 2) as f32;
     let place = (place - 0.5).max(Vec3A::ZERO).min(Vec3A::splat((BUCKETS - 1) as f32)) + INTEGER;
-    let [x, y, z] = [place.x, place.y, place.z].map(|place| spread(place.to_bits()));
-    Key::new(x << 2 | y << 1 | z, triangle)
+    let [x, y, z] = [place.x, place.y, place.z].map(|place| SPREAD[place.to_bits() as usize & (BUCKETS - 1)]);
+    Key::new(u64::from(x << 2 | y << 1 | z), triangle)
 }
 
 /// Makes the keys of solid triangles from the one with the number `first` on, and counts their digits.
@@ -124,15 +124,20 @@ impl Kernel for Encode<'_> {
     }
 }
 
-/// Two empty bits between any two.
-#[inline(always)]
-fn spread(coordinate: u32) -> u64 {
-    let x = coordinate & 0x3ff;
-    let x = (x | x << 16) & 0x0300_00ff;
-    let x = (x | x << 8) & 0x0300_f00f;
-    let x = (x | x << 4) & 0x030c_30c3;
-    u64::from((x | x << 2) & 0x0924_9249)
-}
+/// Coordinates with two empty bits between any two of theirs.
+static SPREAD: [u32; BUCKETS] = {
+    let mut spread = [0; BUCKETS];
+    let mut coordinate = 0;
+    while coordinate < BUCKETS {
+        let x = coordinate as u32;
+        let x = (x | x << 16) & 0x0300_00ff;
+        let x = (x | x << 8) & 0x0300_f00f;
+        let x = (x | x << 4) & 0x030c_30c3;
+        spread[coordinate] = (x | x << 2) & 0x0924_9249;
+        coordinate += 1;
+    }
+    spread
+};
 
 /// What each part has of each digit, after its keys have changed.
 fn recount(keys: &[Key], part: usize, pass: u32, histograms: &mut [[Histogram; 3]]) {
@@ -217,8 +222,8 @@ mod tests {
     #[test]
     fn bits_are_spread_to_every_third_place() {
         for coordinate in 0..1024 {
-            let spread = spread(coordinate);
-            assert!((0..21).all(|bit| spread >> (3 * bit) & 7 == u64::from(coordinate >> bit & 1)));
+            let spread = SPREAD[coordinate];
+            assert!((0..10).all(|bit| spread >> (3 * bit) & 7 == coordinate as u32 >> bit & 1));
         }
     }
 }
