@@ -120,13 +120,11 @@ impl Swept {
     const EMPTY: Self = Self { lower: [Vec4::INFINITY; 3], upper: [Vec4::INFINITY; 3], counts: [0; 4] };
 
     #[inline(always)]
-    fn add(&mut self, rows: &[[f32; LANES]; 3], counts: &[u32; 4]) {
+    fn add(&mut self, bins: [&Side; 3]) {
         for axis in 0..3 {
-            let [lower, upper] = halves(&rows[axis]);
+            let [lower, upper] = halves(&bins[axis].row);
             (self.lower[axis], self.upper[axis]) = (self.lower[axis].min(lower), self.upper[axis].min(upper));
-        }
-        for axis in 0..4 {
-            self.counts[axis] += counts[axis];
+            self.counts[axis] += bins[axis].count;
         }
     }
 
@@ -147,23 +145,28 @@ impl Swept {
 
 /// Bins of records along all axes, reused from node to node.
 #[derive(Debug, Clone)]
-#[repr(C, align(32))]
 pub struct Bins {
-    rows: [[[f32; LANES]; 3]; MOST],
-    counts: [[u32; 4]; MOST],
+    bins: [[Bin; MOST]; 3],
     used: usize,
 }
 
+/// What is in a bin, in a line of its own, so that finding a bin takes no multiplication.
+#[derive(Debug, Clone, Copy)]
+#[repr(align(64))]
+struct Bin(Side);
+
 impl Bins {
     /// Nothing in them.
-    pub const EMPTY: Self = Self { rows: [[Record::NONE.row; 3]; MOST], counts: [[0; 4]; MOST], used: MOST };
+    pub const EMPTY: Self = Self { bins: [[Bin(Side::EMPTY); MOST]; 3], used: MOST };
 
-    /// Put records into `used` bins along every axis.
+    /// Put records into `used` bins along every axis, those of either half in turns: neighbours are often in the same bin,
+    /// which is not to be read soon after it was written.
     #[inline(always)]
     pub fn fill<S: Simd>(&mut self, simd: S, records: &[Record], mapping: &Mapping, used: usize) {
         self.used = used;
-        self.rows[..used].fill([Record::NONE.row; 3]);
-        self.counts[..used].fill([0; 4]);
+        for axis in &mut self.bins {
+            axis[..used].fill(Bin(Side::EMPTY));
+        }
         let (first, second) = records.split_at(records.len() / 2);
         for (one, other) in first.iter().zip(second) {
             self.add(simd, one, mapping);
@@ -178,21 +181,25 @@ impl Bins {
     fn add<S: Simd>(&mut self, simd: S, record: &Record, mapping: &Mapping) {
         let (places, row, count) = (mapping.bins(record), simd.load(&record.row), record.count());
         for axis in 0..3 {
-            let bin = &mut self.rows[places[axis]][axis];
-            *bin = simd.store(simd.min(simd.load(bin), row));
-            self.counts[places[axis]][axis] += count;
+            let Bin(side) = &mut self.bins[axis][places[axis]];
+            side.row = simd.store(simd.min(simd.load(&side.row), row));
+            side.count += count;
         }
     }
 
     /// Together with what is in as many other bins.
     pub fn with(mut self, other: Self) -> Self {
-        for (mine, theirs) in self.rows.iter_mut().flatten().zip(other.rows.iter().flatten()) {
-            *mine = std::array::from_fn(|lane| mine[lane].min(theirs[lane]));
-        }
-        for (mine, theirs) in self.counts.iter_mut().flatten().zip(other.counts.iter().flatten()) {
-            *mine += theirs;
+        for (mine, theirs) in self.bins.iter_mut().flatten().zip(other.bins.iter().flatten()) {
+            mine.0.add(&theirs.0.row, theirs.0.count);
         }
         self
+    }
+
+    /// The bins with a number.
+    #[inline(always)]
+    fn along(&self, bin: usize) -> [&Side; 3] {
+        let [x, y, z] = &self.bins;
+        [&x[bin].0, &y[bin].0, &z[bin].0]
     }
 
     /// The cheapest plane with records on both of its sides: a side without triangles has infinite extents and no
@@ -202,7 +209,7 @@ impl Bins {
         let right_costs = self.right_costs();
         let (mut left, mut least, mut bins) = (Swept::EMPTY, Vec4::INFINITY, Vec4::ZERO);
         for bin in 1..self.used {
-            left.add(&self.rows[bin - 1], &self.counts[bin - 1]);
+            left.add(self.along(bin - 1));
             let cost = left.cost() + right_costs[bin];
             let is_less = cost.cmplt(least);
             least = Vec4::select(is_less, cost, least);
@@ -223,7 +230,7 @@ impl Bins {
     fn right_costs(&self) -> [Vec4; MOST] {
         let (mut costs, mut right) = ([Vec4::ZERO; MOST], Swept::EMPTY);
         for bin in (1..self.used).rev() {
-            right.add(&self.rows[bin], &self.counts[bin]);
+            right.add(self.along(bin));
             costs[bin] = right.cost();
         }
         costs
@@ -233,13 +240,12 @@ impl Bins {
     #[inline(always)]
     pub fn sides<S: Simd>(&self, simd: S, plane: &Plane) -> [Side; 2] {
         let (mut rows, mut counts) = ([simd.splat(f32::INFINITY); 2], [0; 2]);
-        for bin in 0..plane.bin {
-            rows[0] = simd.min(rows[0], simd.load(&self.rows[bin][plane.axis]));
-            counts[0] += self.counts[bin][plane.axis];
-        }
-        for bin in plane.bin..self.used {
-            rows[1] = simd.min(rows[1], simd.load(&self.rows[bin][plane.axis]));
-            counts[1] += self.counts[bin][plane.axis];
+        let (left, right) = self.bins[plane.axis][..self.used].split_at(plane.bin);
+        for (k, bins) in [left, right].into_iter().enumerate() {
+            for Bin(side) in bins {
+                rows[k] = simd.min(rows[k], simd.load(&side.row));
+                counts[k] += side.count;
+            }
         }
         [Side { row: simd.store(rows[0]), count: counts[0] }, Side { row: simd.store(rows[1]), count: counts[1] }]
     }
