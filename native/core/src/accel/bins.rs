@@ -18,8 +18,10 @@ pub struct Mapping {
     scale: Vec3A,
 }
 
-/// A number below 2^22 plus this constant has its integer in the low bits, and needs no instruction to convert it.
-const INTEGER: f32 = (3 << 22) as f32;
+/// A place from 0 to 2^16 plus this constant has its integer from bit [`POINT`] on: no instruction is needed to convert
+/// it, nor to multiply it by the size of a [`Bin`].
+const INTEGER: f32 = (3 << 16) as f32;
+const POINT: u32 = 6;
 
 /// The box around twice the centres of records.
 pub type Centres = BoundsA;
@@ -41,21 +43,21 @@ impl Mapping {
     /// Of centres in a box to `bins` bins.
     #[inline(always)]
     pub fn between(centres: &Centres, bins: usize) -> Self {
-        let scale = bins as f32 * (1.0 - 1e-6) / (centres.upper - centres.lower);
+        let scale = bins as f32 * (1.0 - 1.0 / 256.0) / (centres.upper - centres.lower);
         Self { lower: centres.lower, scale: Vec3A::select(scale.cmple(Vec3A::splat(f32::MAX)), scale, Vec3A::ZERO) }
     }
 
     #[inline(always)]
     fn bins(&self, record: &Record) -> [usize; 3] {
-        let place = (record.centre() - self.lower) * self.scale - Vec3A::splat(0.5) + Vec3A::splat(INTEGER);
-        place.to_array().map(|place| place.to_bits() as usize & (MOST - 1))
+        let place = (record.centre() - self.lower) * self.scale + Vec3A::splat(INTEGER);
+        place.to_array().map(|place| (place.to_bits() >> POINT) as usize & (MOST - 1))
     }
 
     /// Whether a record lies before a plane: along its axis, the arithmetic of [`Mapping::bins`].
     #[inline(always)]
     pub fn is_left(lower: f32, scale: f32, record: &Record, plane: &Plane) -> bool {
-        let place = (record.centre_along(plane.axis) - lower) * scale - 0.5 + INTEGER;
-        (place.to_bits() as usize & (MOST - 1)) < plane.bin
+        let place = (record.centre_along(plane.axis) - lower) * scale + INTEGER;
+        ((place.to_bits() >> POINT) as usize & (MOST - 1)) < plane.bin
     }
 
     /// Where bins begin along an axis, and how many there are to a unit.
