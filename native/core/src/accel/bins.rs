@@ -30,12 +30,17 @@ impl Centres {
     /// Of some records.
     #[inline(always)]
     pub fn of(records: &[Record]) -> Self {
-        let mut all = Self::EMPTY;
-        for record in records {
+        let add = |all: Self, record: &Record| {
             let centre = record.centre();
-            all = all.union(&Self { lower: centre, upper: centre });
+            all.union(&Self { lower: centre, upper: centre })
+        };
+        // Two chains, as each step waits for the one before it.
+        let (pairs, rest) = records.as_chunks::<2>();
+        let mut all = [rest.iter().fold(Self::EMPTY, add), Self::EMPTY];
+        for pair in pairs {
+            all = [add(all[0], &pair[0]), add(all[1], &pair[1])];
         }
-        all
+        all[0].union(&all[1])
     }
 }
 
@@ -161,20 +166,21 @@ impl Bins {
     /// Nothing in them.
     pub const EMPTY: Self = Self { bins: [[Bin(Side::EMPTY); MOST]; 3], used: MOST };
 
-    /// Put records into `used` bins along every axis, those of either half in turns: neighbours are often in the same bin,
-    /// which is not to be read soon after it was written.
+    /// Put records into `used` bins along every axis, from each quarter of them in turns: neighbours are often in the same
+    /// bin, which is not to be read soon after it was written.
     #[inline(always)]
     pub fn fill<S: Simd>(&mut self, simd: S, records: &[Record], mapping: &Mapping, used: usize) {
         self.used = used;
         for axis in &mut self.bins {
             axis[..used].fill(Bin(Side::EMPTY));
         }
-        let (first, second) = records.split_at(records.len() / 2);
-        for (one, other) in first.iter().zip(second) {
-            self.add(simd, one, mapping);
-            self.add(simd, other, mapping);
+        let quarter = records.len() / 4;
+        for index in 0..quarter {
+            for part in 0..4 {
+                self.add(simd, &records[part * quarter + index], mapping);
+            }
         }
-        for record in &second[first.len()..] {
+        for record in &records[4 * quarter..] {
             self.add(simd, record, mapping);
         }
     }

@@ -114,9 +114,10 @@ impl Kernel for Encode<'_> {
     fn run<S: Simd>(self, simd: S) {
         let Self { mesh, cube, first, keys, histograms } = self;
         let reader = mesh.reader();
-        for (key, triangle) in keys.iter_mut().zip(mesh.solid(first)) {
+        for (to, triangle) in keys.iter_mut().zip(mesh.solid(first)) {
             ahead::ask(simd, reader, triangle as usize, |place| u32::try_from(place).ok());
-            *key = self::key(reader.corners(triangle), cube, triangle);
+            let key = key(reader.corners(triangle), cube, triangle);
+            *to = key;
             for (pass, histogram) in histograms.iter_mut().enumerate() {
                 histogram[key.digit(pass as u32)] += 1;
             }
