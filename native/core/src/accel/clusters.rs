@@ -32,6 +32,9 @@ const CHUNK: usize = nearest::MOST;
 /// halls (Sponza) cost 6% more.
 const ROUNDS: [(u32, f32); 2] = [(2, 1.0), (4, 1.0)];
 
+/// So many triangles are moved as one, if a cluster has no more.
+const FEW: usize = 4;
+
 /// Most clusters in a cell.
 const CELL: usize = 4;
 
@@ -205,7 +208,12 @@ impl Merge<'_> {
     #[inline(always)]
     fn take(&mut self, record: &Record, filled: usize) -> usize {
         let (range, count) = (record.range(), record.count() as usize);
-        self.triangles[filled..filled + count].copy_from_slice(&self.order[range]);
+        let (from, to) = (&self.order[range.start..], &mut self.triangles[filled..]);
+        // What follows is overwritten by those that come next. A length that varies would be a call for every few numbers.
+        match (from.first_chunk::<FEW>(), to.first_chunk_mut()) {
+            (Some(from), Some(to)) if count <= FEW => *to = *from,
+            _ => to[..count].copy_from_slice(&from[..count]),
+        }
         filled + count
     }
 
