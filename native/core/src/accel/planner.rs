@@ -239,7 +239,7 @@ impl Planner {
         spare.resize(count.max(spare.len()), Record::NONE);
         links.0.clear();
         let set = Set::new(records, &mut spare[..count]);
-        Division { bins, level: *level, triangles, leaf_size, links, draft }.divide(set);
+        level.run(Division { set, bins, triangles, leaf_size, links, draft });
         collapse.find(links)?;
         (draft.root, draft.stack_size) = Widening { links, collapse, draft }.subtree(0);
         Ok(())
@@ -276,45 +276,40 @@ impl Binary for Links {
     }
 }
 
-/// Divides sets down to leaves.
-struct Division<'a> {
+/// Divides a set down to leaves.
+struct Division<'r, 'a> {
+    set: Set<'r>,
     bins: &'a mut Bins,
-    level: Level,
     triangles: &'a [u32],
     leaf_size: usize,
     links: &'a mut Links,
     draft: &'a mut Draft,
 }
 
-impl Division<'_> {
-    fn divide(&mut self, set: Set<'_>) {
-        let index = self.links.0.len();
-        let half_area = set.side.half_area();
-        if set.count() <= self.leaf_size {
-            let places = set.records.iter().flat_map(|record| record.range());
-            let leaf = self.draft.push_leaf(places.map(|place| self.triangles[place]));
-            self.links.0.push(Link { half_area, right: 0, leaf });
-            return;
-        }
-        self.links.0.push(Link { half_area, right: 0, leaf: NodeRef::EMPTY });
-        let [left, right] = self.level.run(Halve { set, bins: self.bins });
-        self.divide(left);
-        self.links.0[index].right = self.links.0.len() as u32;
-        self.divide(right);
-    }
-}
-
-struct Halve<'r, 'b> {
-    set: Set<'r>,
-    bins: &'b mut Bins,
-}
-
-impl<'r> Kernel for Halve<'r, '_> {
-    type Output = [Set<'r>; 2];
+impl Kernel for Division<'_, '_> {
+    type Output = ();
 
     #[inline(always)]
-    fn run<S: Simd>(self, simd: S) -> Self::Output {
-        divide(simd, self.set, self.bins)
+    fn run<S: Simd>(self, simd: S) {
+        let Self { mut set, bins, triangles, leaf_size, links: Links(links), draft } = self;
+        // Right children, and whose.
+        let mut waiting = Vec::with_capacity(2 * MOST_DEPTH);
+        loop {
+            let half_area = set.side.half_area();
+            if set.count() > leaf_size {
+                let [left, right] = divide(simd, set, bins);
+                waiting.push((links.len(), right));
+                links.push(Link { half_area, right: 0, leaf: NodeRef::EMPTY });
+                set = left;
+                continue;
+            }
+            let places = set.records.iter().flat_map(|record| record.range());
+            let leaf = draft.push_leaf(places.map(|place| triangles[place]));
+            links.push(Link { half_area, right: 0, leaf });
+            let Some((parent, right)) = waiting.pop() else { return };
+            links[parent].right = links.len() as u32;
+            set = right;
+        }
     }
 }
 
