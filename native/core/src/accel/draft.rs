@@ -89,7 +89,8 @@ pub struct Boxes {
 }
 
 impl Boxes {
-    /// The box of a root that has just been fitted.
+    /// The box of what has just been fitted.
+    #[inline(always)]
     fn of(&self, child: NodeRef) -> BoundsA {
         match child.target() {
             Target::Branch(node) => self.nodes[node as usize],
@@ -103,15 +104,38 @@ impl Boxes {
 /// in the mesh's own coordinates.
 pub fn fit(draft: &Draft, mesh: &Mesh, centre: Vec3A, site: &mut Site<'_>, boxes: &mut Boxes, level: Level) -> BoundsA {
     fill_all(&draft.leaves, mesh, site.blocks, boxes, level);
-    boxes.nodes.clear();
-    boxes.nodes.resize(draft.nodes.len(), BoundsA::EMPTY);
-    for (index, children) in draft.nodes.iter().enumerate().rev() {
-        let bounds = children.map(|child| boxes.of(child));
-        let child = children.map(|child| child.moved(site.first_node, site.first_block));
-        site.nodes[index] = Node::new(child, &bounds, centre);
-        boxes.nodes[index] = bounds.iter().fold(BoundsA::EMPTY, |all, bounds| all.union(bounds));
-    }
+    level.run(Nodes { draft, centre, site, boxes });
     boxes.of(draft.root)
+}
+
+/// Writes nodes and finds the boxes around them, those of the leaves given.
+struct Nodes<'a, 's> {
+    draft: &'a Draft,
+    centre: Vec3A,
+    site: &'a mut Site<'s>,
+    boxes: &'a mut Boxes,
+}
+
+impl Kernel for Nodes<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) {
+        let Self { draft, centre, site, boxes } = self;
+        boxes.nodes.clear();
+        boxes.nodes.resize(draft.nodes.len(), BoundsA::EMPTY);
+        for (index, children) in draft.nodes.iter().enumerate().rev() {
+            let (mut all, mut bounds) = (BoundsA::EMPTY, [BoundsA::EMPTY; LANES]);
+            let mut child = [NodeRef::EMPTY; LANES];
+            for lane in 0..LANES {
+                bounds[lane] = boxes.of(children[lane]);
+                all = all.union(&bounds[lane]);
+                child[lane] = children[lane].moved(site.first_node, site.first_block);
+            }
+            site.nodes[index] = Node::new(child, &bounds, centre);
+            boxes.nodes[index] = all;
+        }
+    }
 }
 
 /// Write the blocks of leaves whose triangles are followed by [`MISS`]; the boxes around them remain in `boxes`.

@@ -230,6 +230,7 @@ impl Node {
 
     /// Set the order of visits from the children and their boxes: by where their centres lie along the octant's
     /// diagonal. What comes first in an octant comes last in the opposite one.
+    #[inline(always)]
     pub fn set_order(&mut self) {
         let leaves = self.child.iter().enumerate().fold(0, |leaves, (lane, child)| leaves | child.is_leaf() << lane);
         let [x, y, z]: [[f32; LANES]; 3] =
