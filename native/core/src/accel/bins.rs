@@ -95,9 +95,8 @@ impl Side {
 
     #[inline(always)]
     fn add(&mut self, row: &[f32; LANES], count: u32) {
-        for lane in 0..LANES {
-            self.row[lane] = self.row[lane].min(row[lane]);
-        }
+        let ([lower, upper], [other_lower, other_upper]) = (halves(&self.row), halves(row));
+        self.row = bytemuck::cast([lower.min(other_lower), upper.min(other_upper)]);
         self.count += count;
     }
 

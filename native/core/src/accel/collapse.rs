@@ -83,6 +83,8 @@ impl Collapse {
 }
 
 impl Ways {
+    /// All numbers of places at once, by vectors, the right child's costs shifted by k lanes, took 0.98 to 1.05 of the time
+    /// of a whole build (Zen 5).
     fn of_branch(area: f32, left: &Self, right: &Self) -> Self {
         let mut ways = Self { cost: [0.0; LANES], left: [0; LANES] };
         let divided = |count: usize| {
