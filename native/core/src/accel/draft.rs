@@ -1,10 +1,11 @@
 //! Subtrees as planners leave them: which triangles share a leaf, which children share a node. The geometry is then
 //! fitted from the leaves up, and written once, to where rays will read it.
 
-use glam::{Mat4, Vec3A, Vec4};
+use glam::Vec3A;
 
 use super::{
     ahead,
+    record::halves,
     structure::{Node, NodeRef, Target},
 };
 use crate::{
@@ -163,30 +164,38 @@ impl Kernel for Leaves<'_> {
             for lane in 0..LANES {
                 ahead::ask(simd, reader, index * LANES + lane, |place| all.get(place).copied());
             }
-            boxes.push(fill(leaf, reader, block));
+            boxes.push(fill(simd, leaf, reader, block));
         }
     }
 }
 
 /// Put triangles into a block; returns the box around them.
 #[inline(always)]
-fn fill(leaf: &[u32; LANES], reader: Reader<'_>, block: &mut Block) -> BoundsA {
-    let mut bounds = BoundsA::EMPTY;
-    let mut corners = [[Vec4::ZERO; LANES]; 3];
-    for (lane, &triangle) in leaf.iter().enumerate().take_while(|(_, triangle)| **triangle != MISS) {
-        let triangle = reader.corners(triangle);
-        bounds = bounds.union(&BoundsA::of_aligned_corners(triangle));
-        for c in 0..3 {
-            corners[c][lane] = triangle[c].extend(0.0);
+fn fill<S: Simd>(simd: S, leaf: &[u32; LANES], reader: Reader<'_>, block: &mut Block) -> BoundsA {
+    // Of each triangle two corners, and the third one twice; and what is least and greatest of each.
+    let mut rows = [[simd.splat(0.0); LANES]; 2];
+    let (mut lower, mut upper) = ([simd.splat(f32::INFINITY); 2], [simd.splat(f32::NEG_INFINITY); 2]);
+    for (lane, &triangle) in leaf.iter().enumerate() {
+        if triangle == MISS {
+            break;
+        }
+        let [a, b, c] = reader.rows(triangle);
+        let row = [simd.join(a, b), simd.join(c, c)];
+        for k in 0..2 {
+            rows[k][lane] = row[k];
+            (lower[k], upper[k]) = (simd.min(row[k], lower[k]), simd.max(row[k], upper[k]));
         }
     }
-    for (corner, [a, b, c, d, e, f, g, h]) in block.corner.iter_mut().zip(corners) {
-        let halves = [Mat4::from_cols(a, b, c, d), Mat4::from_cols(e, f, g, h)].map(|half| half.transpose());
+    let [ax, ay, az, _, bx, by, bz, _] = simd.transpose(rows[0]);
+    let [cx, cy, cz, ..] = simd.transpose(rows[1]);
+    let corners = [[ax, ay, az], [bx, by, bz], [cx, cy, cz]];
+    for c in 0..3 {
         for k in 0..3 {
-            corner[k][..4].copy_from_slice(&halves[0].col(k).to_array());
-            corner[k][4..].copy_from_slice(&halves[1].col(k).to_array());
+            block.corner[c][k] = simd.store(corners[c][k]);
         }
     }
     block.primitive = *leaf;
-    bounds
+    let [lower, upper] = [simd.store(simd.min(lower[0], lower[1])), simd.store(simd.max(upper[0], upper[1]))];
+    let ([a, b], [c, d]) = (halves(&lower), halves(&upper));
+    BoundsA { lower: Vec3A::from_vec4(a.min(b)), upper: Vec3A::from_vec4(c.max(d)) }
 }
