@@ -4,8 +4,8 @@
 use crate::{mesh::Reader, simd::Simd};
 
 /// How many triangles ahead indices are asked for, and, once those are there, corners.
-const INDICES: usize = 32;
-const CORNERS: usize = 16;
+const INDICES: usize = 64;
+const CORNERS: usize = 32;
 
 /// Ask for what will be needed soon by who goes through triangles and is at `place`.
 #[inline(always)]
