@@ -13,20 +13,25 @@ use super::{
     morton::Key,
     structure::NodeRef,
 };
-use crate::{Error, Job, triangle::LANES};
+use crate::{
+    Error, Job,
+    simd::{Kernel, Level, Simd},
+    triangle::LANES,
+};
 
 /// Plan the tree over sorted triangles.
 ///
 /// # Errors
 /// [`Error::Cancelled`].
 pub fn plan(keys: &[Key], leaf_size: usize, job: &Job) -> Result<(Top, Vec<Draft>), Error> {
-    let curve = Curve { keys, leaf_size };
+    let (curve, level) = (Curve { keys, leaf_size }, Level::detect());
     let (mut top, mut subtrees) = (Top::default(), Vec::new());
     if !keys.is_empty() {
         curve.upper(0..keys.len(), &mut top, &mut subtrees);
     }
     let drafts = subtrees.into_par_iter().map(|range| {
         job.check()?;
+        level.run(Ask(&keys[range.clone()]));
         let mut draft = Draft::for_triangles(range.len());
         (draft.root, draft.stack_size) = curve.subtree(range, &mut draft);
         job.advance(draft.triangles as u64);
@@ -34,6 +39,23 @@ pub fn plan(keys: &[Key], leaf_size: usize, job: &Job) -> Result<(Top, Vec<Draft
     });
     Ok((top, drafts.collect::<Result<_, Error>>()?))
 }
+
+/// Asks for keys of which the first that are needed lie far apart.
+struct Ask<'a>(&'a [Key]);
+
+impl Kernel for Ask<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) {
+        for line in self.0.chunks(LINE) {
+            simd.prefetch(&line[0]);
+        }
+    }
+}
+
+/// Keys in a line of the cache.
+const LINE: usize = 64 / size_of::<Key>();
 
 struct Curve<'a> {
     keys: &'a [Key],
