@@ -220,8 +220,8 @@ impl Default for Planner {
 }
 
 impl Planner {
-    /// Fill an empty draft with the subtree over the records that are added, which refer to `triangles`. At most `leaf_size` triangles
-    /// are together in a leaf, and no record has more.
+    /// Fill an empty draft with the subtree over the records that are added, which refer to `triangles`. At most
+    /// `leaf_size` triangles are together in a leaf, and no record has more.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`].
