@@ -3,7 +3,8 @@
 
 use crate::{mesh::Reader, simd::Simd};
 
-/// How many triangles ahead indices are asked for, and, once those are there, corners.
+/// How many triangles ahead indices are asked for, and, once those are there, corners. Half as far, `lbvh` took 0.99 to
+/// 1.07 times as long (Zen 5).
 const INDICES: usize = 64;
 const CORNERS: usize = 32;
 

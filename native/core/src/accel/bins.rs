@@ -23,6 +23,12 @@ pub struct Mapping {
 const INTEGER: f32 = (3 << 16) as f32;
 const POINT: u32 = 6;
 
+/// Of a place to which [`INTEGER`] was added.
+#[inline(always)]
+fn bin_of(place: f32) -> usize {
+    (place.to_bits() >> POINT) as usize & (MOST - 1)
+}
+
 /// The box around twice the centres of records.
 pub type Centres = BoundsA;
 
@@ -48,6 +54,7 @@ impl Mapping {
     /// Of centres in a box to `bins` bins.
     #[inline(always)]
     pub fn between(centres: &Centres, bins: usize) -> Self {
+        // Places are rounded to 1/64, by [`POINT`], and none may be rounded up to `bins`, of which there are 16 at most.
         let scale = bins as f32 * (1.0 - 1.0 / 256.0) / (centres.upper - centres.lower);
         Self { lower: centres.lower, scale: Vec3A::select(scale.cmple(Vec3A::splat(f32::MAX)), scale, Vec3A::ZERO) }
     }
@@ -55,14 +62,13 @@ impl Mapping {
     #[inline(always)]
     fn bins(&self, record: &Record) -> [usize; 3] {
         let place = (record.centre() - self.lower) * self.scale + Vec3A::splat(INTEGER);
-        place.to_array().map(|place| (place.to_bits() >> POINT) as usize & (MOST - 1))
+        place.to_array().map(bin_of)
     }
 
     /// Whether a record lies before a plane: along its axis, the arithmetic of [`Mapping::bins`].
     #[inline(always)]
     pub fn is_left(lower: f32, scale: f32, record: &Record, plane: &Plane) -> bool {
-        let place = (record.centre_along(plane.axis) - lower) * scale + INTEGER;
-        ((place.to_bits() >> POINT) as usize & (MOST - 1)) < plane.bin
+        bin_of((record.centre_along(plane.axis) - lower) * scale + INTEGER) < plane.bin
     }
 
     /// Where bins begin along an axis, and how many there are to a unit.
