@@ -125,6 +125,24 @@ pub trait Simd: Arithmetic {
     fn positive_f64(self, value: Self::F64) -> u32;
     /// Bit `i` is set where lane `i` is below zero.
     fn negative_f64(self, value: Self::F64) -> u32;
+    /// Which of eight boxes a ray meets within an interval, given their near and far planes along every axis, and the
+    /// ray's inverse direction and what is to be added to products with it.
+    #[inline(always)]
+    fn meet(
+        self,
+        [near, far]: &[[Self::F32; 3]; 2],
+        inverse: &[f32; 3],
+        bias: &[[f32; 2]; 3],
+        interval: &[f32; 2],
+    ) -> u32 {
+        let (mut from, mut to) = (self.splat(interval[0]), self.splat(interval[1]));
+        for k in 0..3 {
+            let inverse = self.splat(inverse[k]);
+            from = self.max(self.mul_add(near[k], inverse, self.splat(bias[k][0])), from);
+            to = self.min(self.mul_add(far[k], inverse, self.splat(bias[k][1])), to);
+        }
+        self.le(from, to)
+    }
     /// Ask for a value that is to be read soon; may do nothing.
     fn prefetch<T>(self, value: &T);
     /// Copy the ids whose mask has bit `bit` to the front of `out`, in order, and count them.

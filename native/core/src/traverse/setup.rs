@@ -1,7 +1,5 @@
 //! Several frames at once: [`Frame::new`] in vectors, operation by operation, so that both give the same bits.
 
-use bytemuck::Zeroable;
-
 use super::frame::{DILATION, Domain, Frame, NEAR, PARALLEL, Shears, Slabs};
 use crate::{
     ray::MISS,
@@ -115,35 +113,50 @@ impl<S: Simd> Frames<S> {
     /// The frames one by one.
     #[inline(always)]
     pub fn store(&self, simd: S, frames: &mut [Frame; LANES]) {
-        let (slabs, shears) = self.lines(simd);
+        let ([nx, ny, nz], [fx, fy, fz]) = (self.near_bias, self.far_bias);
+        let (first, second) = (self.first(simd, [nx, ny, nz, fx, fy, fz]), self.second(simd));
         for lane in 0..LANES {
-            frames[lane] = Frame::of_lines(&slabs[lane], &shears[lane]);
+            frames[lane] = bytemuck::cast([first[lane], second[lane]]);
         }
     }
 
-    /// The lines of the frames one by one.
+    /// The lines of the frames one by one, as streams have them.
     #[inline(always)]
     pub fn lines(&self, simd: S) -> ([Slabs; LANES], [Shears; LANES]) {
-        let zero = simd.splat(0.0);
-        let Self { tmin, tmax, scale, .. } = *self;
-        let Sheared { axes, depth, steepness, shear } = Sheared::new(simd, self);
-        let [i, n, f] = [self.inverse, self.near_bias, self.far_bias];
-        let [l, o, d] = [self.local, self.origin, self.direction];
-        let slabs = [
-            simd.transpose([i[0], i[1], i[2], n[0], n[1], n[2], f[0], f[1]]),
-            simd.transpose([f[2], l[0], l[1], l[2], tmin, tmax, tmax, bits(simd, MISS)]),
-        ];
-        let shears = [
-            simd.transpose([o[0], o[1], o[2], steepness, d[0], d[1], d[2], depth]),
-            simd.transpose([shear[0], shear[1], axes[0], axes[1], axes[2], scale, zero, zero]),
-        ];
-        let mut lines = ([Slabs::zeroed(); LANES], [Shears::zeroed(); LANES]);
-        for lane in 0..LANES {
-            lines.0[lane] = bytemuck::cast([simd.store(slabs[0][lane]), simd.store(slabs[1][lane])]);
-            lines.1[lane] = bytemuck::cast([simd.store(shears[0][lane]), simd.store(shears[1][lane])]);
-        }
-        lines
+        let ([nx, ny, nz], [fx, fy, fz]) = (self.near_bias, self.far_bias);
+        let first = self.first(simd, [nx, fx, ny, fy, nz, fz]);
+        (bytemuck::cast(first), bytemuck::cast(self.second(simd)))
     }
+
+    /// The first lines, given the biases in the order in which they stand there.
+    #[inline(always)]
+    fn first(&self, simd: S, [a, b, c, d, e, f]: [S::F32; 6]) -> [[[f32; LANES]; 2]; LANES] {
+        let Self { inverse: [x, y, z], local: [lx, ly, lz], tmin, tmax, .. } = *self;
+        let left = simd.transpose([x, y, z, a, b, c, d, e]);
+        let right = simd.transpose([f, lx, ly, lz, tmin, tmax, tmax, bits(simd, MISS)]);
+        beside(simd, left, right)
+    }
+
+    /// The second lines.
+    #[inline(always)]
+    fn second(&self, simd: S) -> [[[f32; LANES]; 2]; LANES] {
+        let zero = simd.splat(0.0);
+        let Sheared { axes: [i, j, k], depth, steepness, shear: [across, along] } = Sheared::new(simd, self);
+        let ([ox, oy, oz], [dx, dy, dz]) = (self.origin, self.direction);
+        let left = simd.transpose([ox, oy, oz, steepness, dx, dy, dz, depth]);
+        let right = simd.transpose([across, along, i, j, k, self.scale, zero, zero]);
+        beside(simd, left, right)
+    }
+}
+
+/// Rows, each of two vectors.
+#[inline(always)]
+fn beside<S: Simd>(simd: S, left: [S::F32; LANES], right: [S::F32; LANES]) -> [[[f32; LANES]; 2]; LANES] {
+    let mut rows = [[[0.0; LANES]; 2]; LANES];
+    for lane in 0..LANES {
+        rows[lane] = [simd.store(left[lane]), simd.store(right[lane])];
+    }
+    rows
 }
 
 /// Three vectors in halves.

@@ -116,6 +116,31 @@ impl Simd for Avx512 {
         unsafe { enter_avx512(self, kernel) }
     }
     vectors!();
+    /// Near and far planes in turns, the latter with their sign changed, so that both are the greatest of four numbers.
+    #[inline(always)]
+    fn meet(
+        self,
+        [near, far]: &[[__m256; 3]; 2],
+        inverse: &[f32; 3],
+        bias: &[[f32; 2]; 3],
+        interval: &[f32; 2],
+    ) -> u32 {
+        // SAFETY: as for `both`; a token exists only where BMI2 was detected, too.
+        unsafe {
+            let minus = _mm512_castsi512_ps(_mm512_set1_epi64(i64::MIN));
+            let turns = _mm512_setr_epi32(0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
+            let mut ends = _mm512_xor_ps(in_turns(*interval), minus);
+            for k in 0..3 {
+                let (near, far) = (_mm512_castps256_ps512(near[k]), _mm512_castps256_ps512(far[k]));
+                let planes = _mm512_xor_ps(_mm512_permutex2var_ps(near, turns, far), minus);
+                let at = _mm512_fmsubadd_ps(planes, _mm512_set1_ps(inverse[k]), in_turns(bias[k]));
+                ends = _mm512_max_ps(at, ends);
+            }
+            let swapped = _mm512_xor_ps(_mm512_permute_ps::<0xb1>(ends), _mm512_set1_ps(-0.0));
+            let twice = _mm512_cmp_ps_mask::<_CMP_LE_OQ>(ends, swapped);
+            _pext_u32(twice.into(), 0x5555)
+        }
+    }
     #[inline(always)]
     fn compact(self, masks: &[u8], bit: u32, ids: &[u16], out: &mut [u16]) -> usize {
         let mut count = 0;
@@ -133,4 +158,11 @@ impl Simd for Avx512 {
         }
         count
     }
+}
+
+/// Two numbers in turns.
+#[inline(always)]
+fn in_turns(pair: [f32; 2]) -> __m512 {
+    // SAFETY: called where a token proves AVX-512 F.
+    unsafe { _mm512_castpd_ps(_mm512_set1_pd(bytemuck::cast(pair))) }
 }

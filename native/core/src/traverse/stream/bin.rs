@@ -65,7 +65,7 @@ impl Bin {
             } else {
                 for ((place, slabs), shears) in (first..places.end).zip(slabs).zip(shears) {
                     let frame = waiting.frame(place, domain)?;
-                    (*slabs, *shears) = (*frame.slabs(), *frame.shears());
+                    (*slabs, *shears) = (frame.slabs(), *frame.shears());
                 }
             }
         }
