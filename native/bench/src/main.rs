@@ -29,7 +29,18 @@ use espalier_core::Method;
 use plan::{Class, Kind, Plan, Query};
 use serde_json::json;
 
+/// Bytes of [`settle`].
+const LARGE: usize = 1 << 20;
+
+/// Let the heap be as in a process that has run for a while. Until something large was freed once, glibc gives more than
+/// 128 KiB at its end back to the system, and whether a build of some thousand triangles waits for those pages again, for
+/// a third of its time, is an accident of the order in which it frees.
+fn settle() {
+    drop(std::hint::black_box(vec![1u8; LARGE]));
+}
+
 fn main() -> ExitCode {
+    settle();
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let result = match arguments[..] {

@@ -2,11 +2,10 @@
 //! neighbours that are each other's nearest are merged, after Meister and Bittner, "Parallel Locally-Ordered Clustering
 //! for Bounding Volume Hierarchy Construction", TVCG 24(3), 2018; as its distance, the area of the box around both.
 //!
-//! Measured against the surface area heuristic over single triangles by the expected cost of the tree: equal (Sibenik),
-//! 1% more (hair, Sponza), 2 to 3% (dragon, city, bunny), 6% (vianney_house); by nodes visited, primary and after a
-//! bounce, 7% fewer (Sibenik) to 12 or 14% more (Sponza and vianney_house from the camera). Fetching the corners,
-//! which miss the cache, is two thirds of the time of clustering; fetching them in a loop of their own did not help, nor
-//! did comparing with 8 neighbours to either side instead of 15.
+//! Measured against the surface area heuristic over single triangles by the expected cost of the tree: 2% less (Sibenik,
+//! vianney_house, Sponza), equal (room, stadium, hospital, soup, hair), 1 to 2.5% more (dragon, saw, horse, city, bunny).
+//! Fetching the corners, which miss the cache, is two thirds of the time of clustering; fetching them in a loop of their own
+//! did not help, nor did comparing with 8 neighbours to either side instead of 15.
 
 use rayon::prelude::*;
 
@@ -97,9 +96,9 @@ impl Clusters {
         Ok(cells)
     }
 
-    /// Add the clusters of a cell.
+    /// The clusters of a cell.
     #[inline(always)]
-    pub fn expand(&self, cell: &Record, clusters: &mut Vec<Record>) {
+    pub fn of_cell(&self, cell: &Record) -> &[Record] {
         let first = cell.range().start;
         let following = &self.chunks[first / CHUNK].clusters[first % CHUNK..];
         let (mut count, mut left) = (0, cell.count());
@@ -107,7 +106,7 @@ impl Clusters {
             left -= following[count].count();
             count += 1;
         }
-        clusters.extend_from_slice(&following[..count]);
+        &following[..count]
     }
 }
 

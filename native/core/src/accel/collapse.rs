@@ -10,95 +10,132 @@ use crate::{Error, error, triangle::LANES};
 
 /// A binary tree, every node before its children, the root first.
 pub trait Binary {
-    /// How many nodes there are.
-    fn count(&self) -> usize;
     /// The children of a node that may be opened.
     fn children(&self, node: usize) -> Option<[usize; 2]>;
+}
+
+/// One whose nodes have boxes.
+pub trait Weighed: Binary {
+    /// How many nodes there are.
+    fn count(&self) -> usize;
     /// Half of the area of the box of a node.
     fn half_area(&self, node: usize) -> f32;
+    /// What a node without children costs, itself the root of a tree, as [`Costs::of_root`] tells: nothing, where it is a
+    /// leaf.
+    fn costs(&self, _node: usize) -> [f32; LANES] {
+        [0.0; LANES]
+    }
 }
 
-/// How a subtree is best shown as at most so many places side by side.
-#[derive(Debug, Clone, Copy)]
-struct Ways {
-    /// The least sum of areas of wide nodes, by the number of places less one.
-    cost: [f32; LANES],
-    /// How many of the places go to the left child; 0 where the subtree is one place.
-    left: [u8; LANES],
+/// By the number of places less one that a subtree is shown as, the least sum of areas of its wide nodes; room that can be
+/// used for another tree.
+#[derive(Debug, Default)]
+pub struct Costs(Vec<[f32; LANES]>);
+
+impl Costs {
+    /// Those of the whole tree.
+    pub fn of_root(&self) -> [f32; LANES] {
+        self.0[0]
+    }
 }
 
-/// The best ways for every node of a tree; room that can be used for another one.
-#[derive(Debug, Default, Clone)]
-pub struct Collapse {
-    ways: Vec<Ways>,
+/// The best ways to show every node of a tree.
+#[derive(Debug)]
+pub struct Collapse(Vec<Ways>);
+
+/// By the number of places that a subtree is shown as, how many of them go to the left child; none where it is one place.
+/// One to eight numbers of three bits.
+#[derive(Debug, Clone, Copy, Default)]
+struct Ways(u32);
+
+impl Ways {
+    const BITS: usize = 3;
+
+    fn of(lefts: [u8; LANES]) -> Self {
+        Self(lefts.iter().rev().fold(0, |all, &left| all << Self::BITS | u32::from(left)))
+    }
+
+    fn left(self, places: usize) -> usize {
+        self.0 as usize >> (Self::BITS * (places - 1)) & (LANES - 1)
+    }
 }
+
+/// A node side by side with others, and how many places it has where it is [one without children](Binary::costs).
+pub type Place = (usize, usize);
 
 impl Collapse {
-    /// Find those of a tree; what has no children stays what it is.
+    /// Find those of a tree, areas in units of `unit`; what has no children stays what it is.
     ///
     /// # Errors
     /// [`Error::OutOfMemory`].
-    pub fn find(&mut self, tree: &impl Binary) -> Result<(), Error> {
-        let nothing = Ways { cost: [0.0; LANES], left: [0; LANES] };
-        let count = tree.count();
-        if self.ways.len() < count {
-            self.ways = error::filled(count, nothing, "the table of wide nodes")?;
+    pub fn of(tree: &(impl Weighed + ?Sized), unit: f32, Costs(costs): &mut Costs) -> Result<Self, Error> {
+        const WHAT: &str = "the table of wide nodes";
+        let (count, scale) = (tree.count(), unit.max(f32::MIN_POSITIVE).recip());
+        if costs.len() < count {
+            *costs = error::filled(count, [0.0; LANES], WHAT)?;
         }
-        let scale = if count == 0 { 1.0 } else { tree.half_area(0).max(f32::MIN_POSITIVE).recip() };
+        let mut all = error::filled(count, Ways::default(), WHAT)?;
         for index in (0..count).rev() {
-            self.ways[index] = match tree.children(index) {
-                Some([left, right]) => {
-                    Ways::of_branch(tree.half_area(index) * scale, &self.ways[left], &self.ways[right])
+            match tree.children(index) {
+                Some([one, other]) => {
+                    let (sums, lefts) = ways(tree.half_area(index) * scale, &costs[one], &costs[other]);
+                    (costs[index], all[index]) = (sums, Ways::of(lefts));
                 }
-                None => nothing,
-            };
+                None => costs[index] = tree.costs(index),
+            }
         }
-        Ok(())
+        Ok(Self(all))
     }
 
-    /// The places side by side in the wide node that a branch of that tree becomes, and their number: two to eight.
-    pub fn children(&self, tree: &impl Binary, branch: usize) -> ([usize; LANES], usize) {
-        let mut children = ([0; LANES], 0);
-        self.divide(tree, branch, LANES, self.ways[branch].left[LANES - 1], &mut children);
+    /// The places side by side in the wide node that a branch of that tree becomes, and how many nodes they are: up to
+    /// eight.
+    pub fn children(&self, tree: &impl Binary, branch: usize) -> ([Place; LANES], usize) {
+        let mut children = ([(0, 0); LANES], 0);
+        self.divide(tree, branch, LANES, self.0[branch].left(LANES), &mut children);
         children
     }
 
-    fn places(&self, tree: &impl Binary, node: usize, count: usize, children: &mut ([usize; LANES], usize)) {
+    /// The nodes that a tree is shown as in a number of places.
+    pub fn shown(&self, tree: &impl Binary, count: usize) -> ([Place; LANES], usize) {
+        let mut nodes = ([(0, 0); LANES], 0);
+        self.places(tree, 0, count, &mut nodes);
+        nodes
+    }
+
+    fn places(&self, tree: &impl Binary, node: usize, count: usize, to: &mut ([Place; LANES], usize)) {
         // The last entry is for the wide node itself.
-        match self.ways[node].left[count - 1] {
+        match self.0[node].left(count) {
             0 => {
-                children.0[children.1] = node;
-                children.1 += 1;
+                to.0[to.1] = (node, count);
+                to.1 += 1;
             }
-            left => self.divide(tree, node, count, left, children),
+            left => self.divide(tree, node, count, left, to),
         }
     }
 
-    fn divide(&self, tree: &impl Binary, node: usize, count: usize, left: u8, to: &mut ([usize; LANES], usize)) {
+    fn divide(&self, tree: &impl Binary, node: usize, count: usize, left: usize, to: &mut ([Place; LANES], usize)) {
         if let Some([first, second]) = tree.children(node) {
-            self.places(tree, first, usize::from(left), to);
-            self.places(tree, second, count - usize::from(left), to);
+            self.places(tree, first, left, to);
+            self.places(tree, second, count - left, to);
         }
     }
 }
 
-impl Ways {
-    /// All numbers of places at once, by vectors, the right child's costs shifted by k lanes, took 0.98 to 1.05 of the time
-    /// of a whole build (Zen 5).
-    fn of_branch(area: f32, left: &Self, right: &Self) -> Self {
-        let mut ways = Self { cost: [0.0; LANES], left: [0; LANES] };
-        let divided = |count: usize| {
-            let ways = (1..count).map(|k| (left.cost[k - 1] + right.cost[count - k - 1], k as u8));
-            ways.fold((f32::INFINITY, 1), |best, way| if way.0 < best.0 { way } else { best })
-        };
-        let (below, widest) = divided(LANES);
-        let single = area + below;
-        (ways.cost[0], ways.left[0]) = (single, 0);
-        for count in 2..LANES {
-            let (cost, k) = divided(count);
-            (ways.cost[count - 1], ways.left[count - 1]) = if cost < single { (cost, k) } else { (single, 0) };
-        }
-        (ways.cost[LANES - 1], ways.left[LANES - 1]) = (below, widest);
-        ways
+/// The costs of a branch from those of its children, and how many places go to the left one. All numbers of places at once,
+/// by vectors, the right child's costs shifted by k lanes, took 0.98 to 1.05 of the time of a whole build (Zen 5).
+fn ways(area: f32, left: &[f32; LANES], right: &[f32; LANES]) -> ([f32; LANES], [u8; LANES]) {
+    let (mut costs, mut lefts) = ([0.0; LANES], [0; LANES]);
+    let divided = |count: usize| {
+        let ways = (1..count).map(|k| (left[k - 1] + right[count - k - 1], k as u8));
+        ways.fold((f32::INFINITY, 1), |best, way| if way.0 < best.0 { way } else { best })
+    };
+    let (below, widest) = divided(LANES);
+    let single = area + below;
+    costs[0] = single;
+    for count in 2..LANES {
+        let (cost, k) = divided(count);
+        (costs[count - 1], lefts[count - 1]) = if cost < single { (cost, k) } else { (single, 0) };
     }
+    (costs[LANES - 1], lefts[LANES - 1]) = (below, widest);
+    (costs, lefts)
 }

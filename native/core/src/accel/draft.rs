@@ -24,18 +24,29 @@ pub struct Draft {
     pub nodes: Vec<[NodeRef; LANES]>,
     /// The triangles of every leaf, [`MISS`] behind the last.
     pub leaves: Vec<[u32; LANES]>,
-    /// Where rays begin.
-    pub root: NodeRef,
-    /// Most entries a traversal can put on its stack.
-    pub stack_size: usize,
+    /// Where rays begin: one of them, or several that stand side by side in a node above.
+    pub roots: Vec<Root>,
     /// How many triangles are in its leaves.
     pub triangles: usize,
 }
 
+/// Where rays begin.
+#[derive(Debug, Clone, Copy)]
+pub struct Root {
+    /// A node or a leaf.
+    pub node: NodeRef,
+    /// Most entries a traversal can put on its stack.
+    pub stack_size: usize,
+}
+
+impl Root {
+    /// Where there are no triangles.
+    pub const EMPTY: Self = Self { node: NodeRef::EMPTY, stack_size: 0 };
+}
+
 impl Draft {
     /// Nothing.
-    pub const EMPTY: Self =
-        Self { nodes: Vec::new(), leaves: Vec::new(), root: NodeRef::EMPTY, stack_size: 0, triangles: 0 };
+    pub const EMPTY: Self = Self { nodes: Vec::new(), leaves: Vec::new(), roots: Vec::new(), triangles: 0 };
 
     /// Nothing, with room for the nodes and leaves that so many triangles usually need: to grow, all would be copied.
     pub fn for_triangles(count: usize) -> Self {
@@ -46,7 +57,8 @@ impl Draft {
     pub fn clear(&mut self) {
         self.nodes.clear();
         self.leaves.clear();
-        (self.root, self.stack_size, self.triangles) = (NodeRef::EMPTY, 0, 0);
+        self.roots.clear();
+        self.triangles = 0;
     }
 
     /// Add a leaf of one to eight triangles.
@@ -92,7 +104,7 @@ pub struct Boxes {
 impl Boxes {
     /// The box of what has just been fitted.
     #[inline(always)]
-    fn of(&self, child: NodeRef) -> BoundsA {
+    pub fn of(&self, child: NodeRef) -> BoundsA {
         match child.target() {
             Target::Branch(node) => self.nodes[node as usize],
             Target::Leaf { block, .. } => self.leaves[block as usize],
@@ -101,12 +113,11 @@ impl Boxes {
     }
 }
 
-/// Write a draft: blocks of triangles, then nodes around them from the last to the first. Returns the box of the root,
-/// in the mesh's own coordinates.
-pub fn fit(draft: &Draft, mesh: &Mesh, centre: Vec3A, site: &mut Site<'_>, boxes: &mut Boxes, level: Level) -> BoundsA {
+/// Write a draft: blocks of triangles, then nodes around them from the last to the first. The boxes of all remain in
+/// `boxes`, in the mesh's own coordinates.
+pub fn fit(draft: &Draft, mesh: &Mesh, centre: Vec3A, site: &mut Site<'_>, boxes: &mut Boxes, level: Level) {
     fill_all(&draft.leaves, mesh, site.blocks, boxes, level);
     level.run(Nodes { draft, centre, site, boxes });
-    boxes.of(draft.root)
 }
 
 /// Writes nodes and finds the boxes around them, those of the leaves given.

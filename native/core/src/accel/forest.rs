@@ -5,7 +5,7 @@ use glam::Vec3A;
 use rayon::prelude::*;
 
 use super::{
-    draft::{self, Boxes, Draft, Site},
+    draft::{self, Boxes, Draft, Root, Site},
     structure::{Node, NodeRef, Structure},
 };
 use crate::{
@@ -26,14 +26,14 @@ pub const SUBTREE: usize = 1 << 14;
 pub enum Child {
     /// Another of them.
     Top(usize),
-    /// A subtree.
-    Subtree(usize),
+    /// A root of a subtree: all roots of all drafts are numbered in order.
+    Root(usize),
 }
 
 /// The nodes at the top, each before its children.
 #[derive(Debug, Default)]
 pub struct Top {
-    /// The children of each; none where a subtree is all there is.
+    /// The children of each; none where one root is all there is.
     pub nodes: Vec<Vec<Child>>,
 }
 
@@ -56,7 +56,7 @@ pub fn write(top: &Top, drafts: &[Draft], mesh: &Mesh, job: &Job) -> Result<Stru
     let mut blocks = Arena::stale(total(|draft| draft.leaves.len()), "the leaves")?;
     let (top_nodes, below) = nodes.split_at_mut(top.nodes.len());
     let sites = sites(drafts, top.nodes.len(), below, &mut blocks);
-    let subtrees: Result<Vec<Written>, Error> = sites
+    let subtrees: Result<Vec<Vec<Written>>, Error> = sites
         .into_par_iter()
         .zip(drafts)
         .map_init(Boxes::default, |boxes, (site, draft)| {
@@ -66,7 +66,7 @@ pub fn write(top: &Top, drafts: &[Draft], mesh: &Mesh, job: &Job) -> Result<Stru
             Ok(written)
         })
         .collect();
-    let root = write_top(top, &subtrees?, top_nodes, domain.centre.into());
+    let root = write_top(top, &subtrees?.concat(), top_nodes, domain.centre.into());
     let (root, stack_size) = root.map_or((NodeRef::EMPTY, 0), |root| (root.root, root.stack_size));
     Ok(Structure { nodes, blocks, stack_size, ..Structure::of(root, domain) })
 }
@@ -90,13 +90,18 @@ fn sites<'a>(
     drafts.iter().map(site).collect()
 }
 
-fn write_subtree(mut site: Site<'_>, draft: &Draft, mesh: &Mesh, centre: Vec3A, boxes: &mut Boxes) -> Written {
-    let bounds = draft::fit(draft, mesh, centre, &mut site, boxes, Level::detect());
-    Written { root: draft.root.moved(site.first_node, site.first_block), bounds, stack_size: draft.stack_size }
+fn write_subtree(mut site: Site<'_>, draft: &Draft, mesh: &Mesh, centre: Vec3A, boxes: &mut Boxes) -> Vec<Written> {
+    draft::fit(draft, mesh, centre, &mut site, boxes, Level::detect());
+    let written = |&Root { node, stack_size }: &Root| Written {
+        root: node.moved(site.first_node, site.first_block),
+        bounds: boxes.of(node),
+        stack_size,
+    };
+    draft.roots.iter().map(written).collect()
 }
 
 /// Returns the root, if there is any.
-fn write_top(top: &Top, subtrees: &[Written], nodes: &mut [Node], centre: Vec3A) -> Option<Written> {
+fn write_top(top: &Top, roots: &[Written], nodes: &mut [Node], centre: Vec3A) -> Option<Written> {
     const NOTHING: Written = Written { root: NodeRef::EMPTY, bounds: BoundsA::EMPTY, stack_size: 0 };
     let mut written = vec![NOTHING; nodes.len()];
     for (index, children) in top.nodes.iter().enumerate().rev() {
@@ -104,7 +109,7 @@ fn write_top(top: &Top, subtrees: &[Written], nodes: &mut [Node], centre: Vec3A)
         for (lane, child) in children.iter().enumerate() {
             all[lane] = match *child {
                 Child::Top(node) => written[node],
-                Child::Subtree(subtree) => subtrees[subtree],
+                Child::Root(root) => roots[root],
             };
         }
         nodes[index] = Node::new(all.map(|child| child.root), &all.map(|child| child.bounds), centre);
@@ -115,5 +120,5 @@ fn write_top(top: &Top, subtrees: &[Written], nodes: &mut [Node], centre: Vec3A)
             stack_size: children.len() - 1 + deepest.unwrap_or(0),
         };
     }
-    written.first().or(subtrees.first()).copied()
+    written.first().or(roots.first()).copied()
 }

@@ -5,7 +5,7 @@
 use rayon::prelude::*;
 
 use super::{
-    collapse::Collapse,
+    collapse::{Collapse, Costs},
     structure::{NEST_STACK, NodeRef},
     tree::{BuiltNest, Kind, Tree},
 };
@@ -56,11 +56,13 @@ impl Layout {
     /// # Errors
     /// [`Error::Cancelled`], [`Error::OutOfMemory`].
     pub fn of(tree: &Tree, opening: Opening, job: &Job) -> Result<Self, Error> {
-        let mut collapse = (opening == Opening::Cheapest).then(Collapse::default);
-        if let Some(collapse) = &mut collapse {
-            collapse.find(tree)?;
-        }
-        if tree.nodes.is_empty() { Ok(Self::EMPTY) } else { Widener { tree, collapse, job }.alone(0) }
+        let Some(root) = tree.nodes.first() else { return Ok(Self::EMPTY) };
+        let unit = root.bounds.half_area();
+        let collapse = match opening {
+            Opening::Cheapest => Some(Collapse::of(tree, unit, &mut Costs::default())?),
+            Opening::Largest => None,
+        };
+        Widener { tree, collapse, job }.alone(0)
     }
 
     /// Add another one behind all there is; returns where its root is then.
@@ -155,7 +157,7 @@ impl Widener<'_> {
     fn side_by_side(&self, index: usize) -> ([u32; LANES], usize) {
         let Some(collapse) = &self.collapse else { return self.opened(index) };
         let (children, count) = collapse.children(self.tree, index);
-        (children.map(|child| child as u32), count)
+        (children.map(|(child, _)| child as u32), count)
     }
 
     /// The same where whichever is largest is opened first.

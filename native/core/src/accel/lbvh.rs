@@ -8,7 +8,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::{
-    draft::Draft,
+    draft::{Draft, Root},
     forest::{Child, SUBTREE, Top},
     morton::Key,
     structure::NodeRef,
@@ -33,7 +33,8 @@ pub fn plan(keys: &[Key], leaf_size: usize, job: &Job) -> Result<(Top, Vec<Draft
         job.check()?;
         level.run(Ask(&keys[range.clone()]));
         let mut draft = Draft::for_triangles(range.len());
-        (draft.root, draft.stack_size) = curve.subtree(range, &mut draft);
+        let (node, stack_size) = curve.subtree(range, &mut draft);
+        draft.roots.push(Root { node, stack_size });
         job.advance(draft.triangles as u64);
         Ok(draft)
     });
@@ -66,7 +67,7 @@ impl Curve<'_> {
     fn upper(&self, range: Range<usize>, top: &mut Top, subtrees: &mut Vec<Range<usize>>) -> Child {
         if range.len() <= SUBTREE {
             subtrees.push(range);
-            return Child::Subtree(subtrees.len() - 1);
+            return Child::Root(subtrees.len() - 1);
         }
         let slot = top.nodes.len();
         top.nodes.push(Vec::new());

@@ -16,6 +16,7 @@ pub mod collapse;
 pub mod config;
 pub mod content;
 pub mod decision;
+pub mod divided;
 pub mod draft;
 mod expand;
 pub mod expected;

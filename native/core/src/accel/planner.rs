@@ -1,18 +1,13 @@
 //! The binned surface area heuristic over records, which move between two buffers, so that a division is one pass without
-//! a branch. At the top of a tree a node's largest child is divided until eight are side by side; a subtree is divided
-//! down to leaves as a binary tree, of which the cheapest wide nodes are chosen.
+//! a branch.
 
 use rayon::prelude::*;
 
 use super::{
     bins::{self, Bins, Centres, Mapping, Plane, Side},
-    collapse::{Binary, Collapse},
-    draft::Draft,
     record::Record,
-    structure::NodeRef,
 };
 use crate::{
-    Error,
     simd::{Kernel, Level, Simd},
     triangle::LANES,
 };
@@ -27,9 +22,9 @@ pub struct Set<'r> {
 }
 
 impl<'r> Set<'r> {
-    /// All of some records; there must be as much spare room.
+    /// All of some records; there must be as much spare room or more.
     pub fn new(records: &'r mut [Record], spare: &'r mut [Record]) -> Self {
-        let side = Side::of(records);
+        let (side, spare) = (Side::of(records), &mut spare[..records.len()]);
         Self { records, spare, depth: 0, side }
     }
 
@@ -38,10 +33,15 @@ impl<'r> Set<'r> {
         self.side.count as usize
     }
 
+    /// Half of the area of the box around them.
+    pub fn half_area(&self) -> f32 {
+        self.side.half_area()
+    }
+
     /// Its area where it may be divided; less than none where it has at most `whole` triangles.
     #[inline(always)]
     fn priority(&self, whole: usize) -> f32 {
-        if self.count() <= whole { -1.0 } else { self.side.half_area() }
+        if self.count() <= whole { -1.0 } else { self.half_area() }
     }
 
     /// Its records.
@@ -67,7 +67,7 @@ impl<'r> Set<'r> {
 }
 
 /// Below this depth of divisions records are halved as they stand, which bounds the stack of every traversal.
-const MOST_DEPTH: usize = 64;
+pub const MOST_DEPTH: usize = 64;
 
 /// Larger sets are put into bins in parallel, in parts of this size.
 const PART: usize = 1 << 14;
@@ -118,8 +118,28 @@ impl<'r> Kernel for Open<'r, '_> {
     }
 }
 
+/// Both parts of a set of at least two records.
+pub fn halve<'r>(set: Set<'r>, bins: &mut Bins, level: Level) -> [Set<'r>; 2] {
+    level.run(Halve { set, bins })
+}
+
+struct Halve<'r, 'b> {
+    set: Set<'r>,
+    bins: &'b mut Bins,
+}
+
+impl<'r> Kernel for Halve<'r, '_> {
+    type Output = [Set<'r>; 2];
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> Self::Output {
+        divide(simd, self.set, self.bins)
+    }
+}
+
+/// Both parts of a set of at least two records.
 #[inline(always)]
-fn divide<'r, S: Simd>(simd: S, set: Set<'r>, bins: &mut Bins) -> [Set<'r>; 2] {
+pub fn divide<'r, S: Simd>(simd: S, set: Set<'r>, bins: &mut Bins) -> [Set<'r>; 2] {
     let plane = if set.depth < MOST_DEPTH { best_plane(simd, set.records, bins) } else { None };
     match plane {
         Some((plane, mapping)) => {
@@ -193,149 +213,4 @@ fn partition<S: Simd>(simd: S, from: &[Record], to: &mut [Record], plane: &Plane
         right -= usize::from(!is_left);
     }
     left
-}
-
-/// Room to plan in, reused from subtree to subtree.
-#[derive(Debug, Clone)]
-pub struct Planner {
-    records: Vec<Record>,
-    spare: Vec<Record>,
-    bins: Bins,
-    links: Links,
-    collapse: Collapse,
-    level: Level,
-}
-
-impl Default for Planner {
-    fn default() -> Self {
-        Self {
-            records: Vec::new(),
-            spare: Vec::new(),
-            bins: Bins::EMPTY,
-            links: Links::default(),
-            collapse: Collapse::default(),
-            level: Level::detect(),
-        }
-    }
-}
-
-impl Planner {
-    /// Fill an empty draft with the subtree over the records that are added, which refer to `triangles`. At most
-    /// `leaf_size` triangles are together in a leaf, and no record has more.
-    ///
-    /// # Errors
-    /// [`Error::OutOfMemory`].
-    pub fn plan(
-        &mut self,
-        add_records: impl FnOnce(&mut Vec<Record>),
-        triangles: &[u32],
-        leaf_size: usize,
-        draft: &mut Draft,
-    ) -> Result<(), Error> {
-        let Self { records, spare, bins, links, collapse, level } = self;
-        records.clear();
-        add_records(records);
-        let count = records.len();
-        spare.resize(count.max(spare.len()), Record::NONE);
-        links.0.clear();
-        let set = Set::new(records, &mut spare[..count]);
-        level.run(Division { set, bins, triangles, leaf_size, links, draft });
-        collapse.find(links)?;
-        (draft.root, draft.stack_size) = Widening { links, collapse, draft }.subtree(0);
-        Ok(())
-    }
-}
-
-/// A binary tree in preorder.
-#[derive(Debug, Default, Clone)]
-struct Links(Vec<Link>);
-
-#[derive(Debug, Clone, Copy)]
-struct Link {
-    half_area: f32,
-    /// The right child; the left one is the next node.
-    right: u32,
-    /// What it is instead, where it is a leaf.
-    leaf: NodeRef,
-}
-
-impl Binary for Links {
-    fn count(&self) -> usize {
-        self.0.len()
-    }
-
-    #[inline]
-    fn children(&self, node: usize) -> Option<[usize; 2]> {
-        let link = &self.0[node];
-        (link.leaf == NodeRef::EMPTY).then_some([node + 1, link.right as usize])
-    }
-
-    #[inline]
-    fn half_area(&self, node: usize) -> f32 {
-        self.0[node].half_area
-    }
-}
-
-/// Divides a set down to leaves.
-struct Division<'r, 'a> {
-    set: Set<'r>,
-    bins: &'a mut Bins,
-    triangles: &'a [u32],
-    leaf_size: usize,
-    links: &'a mut Links,
-    draft: &'a mut Draft,
-}
-
-impl Kernel for Division<'_, '_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<S: Simd>(self, simd: S) {
-        let Self { mut set, bins, triangles, leaf_size, links: Links(links), draft } = self;
-        // Right children, and whose.
-        let mut waiting = Vec::with_capacity(2 * MOST_DEPTH);
-        loop {
-            let half_area = set.side.half_area();
-            if set.count() > leaf_size {
-                let [left, right] = divide(simd, set, bins);
-                waiting.push((links.len(), right));
-                links.push(Link { half_area, right: 0, leaf: NodeRef::EMPTY });
-                set = left;
-                continue;
-            }
-            let places = set.records.iter().flat_map(|record| record.range());
-            let leaf = draft.push_leaf(places.map(|place| triangles[place]));
-            links.push(Link { half_area, right: 0, leaf });
-            let Some((parent, right)) = waiting.pop() else { return };
-            links[parent].right = links.len() as u32;
-            set = right;
-        }
-    }
-}
-
-/// Makes wide nodes of the binary ones.
-struct Widening<'a> {
-    links: &'a Links,
-    collapse: &'a Collapse,
-    draft: &'a mut Draft,
-}
-
-impl Widening<'_> {
-    /// Returns where it is, and the entries a traversal needs on its stack.
-    fn subtree(&mut self, node: usize) -> (NodeRef, usize) {
-        let leaf = self.links.0[node].leaf;
-        if leaf != NodeRef::EMPTY {
-            return (leaf, 0);
-        }
-        let slot = self.draft.nodes.len();
-        self.draft.nodes.push([NodeRef::EMPTY; LANES]);
-        let (children, count) = self.collapse.children(self.links, node);
-        let mut deepest = 0;
-        for (lane, &child) in children[..count].iter().enumerate() {
-            let (child, below) = self.subtree(child);
-            self.draft.nodes[slot][lane] = child;
-            deepest = deepest.max(below);
-        }
-        (NodeRef::branch(slot), count - 1 + deepest)
-    }
 }

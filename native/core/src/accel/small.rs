@@ -1,7 +1,7 @@
 //! Small subtrees, by one thread, without a look at anything but their triangles: for what is built while rays wait.
 
 use super::{
-    draft::{self, Boxes, Draft, Site},
+    draft::{self, Boxes, Draft, Root, Site},
     record::UnitCube,
     structure::{Node, NodeRef},
     sweep::{Item, Run, Sweep},
@@ -71,7 +71,7 @@ impl SmallBuilder {
             let scale = UnitCube::new(&mesh.bounds()).scale();
             let all = Run::new(items, 0..items.len());
             let (root, stack_size) = InOrder { triangles, items, scale, sweep, draft }.subtree(all);
-            (draft.root, draft.stack_size) = (root, stack_size);
+            draft.roots.push(Root { node: root, stack_size });
         }
         self.write(mesh)
     }
@@ -82,8 +82,9 @@ impl SmallBuilder {
         let mut nodes = error::filled(draft.nodes.len(), Node::EMPTY, "the nodes of a subtree")?;
         let mut blocks = error::filled(draft.leaves.len(), Block::EMPTY, "the leaves of a subtree")?;
         let mut site = Site { nodes: &mut nodes, blocks: &mut blocks, first_node: 0, first_block: 0 };
-        let bounds = draft::fit(draft, mesh, domain.centre.into(), &mut site, boxes, *level).into();
-        Ok(Subtree { root: draft.root, nodes, blocks, stack_size: draft.stack_size, bounds })
+        draft::fit(draft, mesh, domain.centre.into(), &mut site, boxes, *level);
+        let Root { node: root, stack_size } = draft.roots.first().copied().unwrap_or(Root::EMPTY);
+        Ok(Subtree { root, nodes, blocks, stack_size, bounds: boxes.of(root).into() })
     }
 }
 

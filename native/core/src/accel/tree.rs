@@ -3,7 +3,11 @@
 
 use rayon::prelude::*;
 
-use super::{collapse::Binary, grid::BuiltGrid, structure::Grid};
+use super::{
+    collapse::{Binary, Weighed},
+    grid::BuiltGrid,
+    structure::Grid,
+};
 use crate::{
     Error, Job, Mesh,
     bounds::{Bounds, BoundsA},
@@ -91,12 +95,14 @@ impl Tree {
 }
 
 impl Binary for Tree {
-    fn count(&self) -> usize {
-        self.nodes.len()
-    }
-
     fn children(&self, node: usize) -> Option<[usize; 2]> {
         self.children(node)
+    }
+}
+
+impl Weighed for Tree {
+    fn count(&self) -> usize {
+        self.nodes.len()
     }
 
     fn half_area(&self, node: usize) -> f32 {
