@@ -78,6 +78,8 @@ pub trait Arithmetic: Copy + Send + Sync + 'static {
 pub trait Simd: Arithmetic {
     /// Lists of ids are handled in groups of this many.
     const GROUP: usize = 8;
+    /// Whether sixteen lanes are one register.
+    const IS_WIDE: bool = false;
 
     /// Eight numbers in double precision.
     type F64: Copy;

@@ -8,6 +8,7 @@ use crate::{
 };
 
 /// The frames of a vector's rays, by column.
+#[derive(Clone, Copy)]
 pub struct Frames<S: Arithmetic> {
     /// See [`Frame::inverse`].
     pub inverse: [S::F32; 3],
@@ -29,6 +30,23 @@ pub struct Frames<S: Arithmetic> {
 }
 
 impl<S: Arithmetic> Frames<S> {
+    /// No rays', to be overwritten.
+    #[inline(always)]
+    pub fn none(simd: S) -> Self {
+        let (zero, zeros) = (simd.splat(0.0), [simd.splat(0.0); 3]);
+        Self {
+            inverse: zeros,
+            near_bias: zeros,
+            far_bias: zeros,
+            tmin: zero,
+            tmax: zero,
+            local: zeros,
+            direction: zeros,
+            origin: zeros,
+            scale: zero,
+        }
+    }
+
     /// The frames of rays given by column: origin, direction, tmin, tmax. `None` where one of them is unusable
     /// or begins far away; then [`Frame::new`] is to be asked for each.
     #[inline(always)]

@@ -45,6 +45,7 @@ pub struct Triangles {
 }
 
 /// A triangle before some rays.
+#[derive(Clone, Copy)]
 pub struct Weights<W: Arithmetic> {
     /// The least of the three weights, times the determinant.
     pub least: W::F32,

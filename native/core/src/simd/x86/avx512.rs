@@ -55,6 +55,7 @@ impl Arithmetic for Avx512 {
 
 impl Simd for Avx512 {
     const GROUP: usize = MOST_GROUP;
+    const IS_WIDE: bool = true;
     type F64 = [__m256d; 2];
     type Wide = Zmm;
 

@@ -1,4 +1,4 @@
-//! Packets: sixteen rays of a batch, as they come, walk the tree together where any hit will do. A node's children are
+//! Packets: some rays of a batch, as they come, walk the tree together where any hit will do. A node's children are
 //! first compared with the box around the rays' segments, all eight at once, and only then with the rays: short rays
 //! that begin side by side, as those of ambient occlusion, pass by most boxes together. After Wald, Slusallek, Benthin
 //! and Wagner, "Interactive Rendering with Coherent Ray Tracing", Eurographics 2001, and Boulos, Wald and Shirley,
@@ -21,7 +21,7 @@ mod rays;
 
 use bytemuck::Zeroable;
 
-use self::rays::Packet;
+use self::rays::{Packet, RAYS};
 use super::{
     Tracer,
     frame::{Domain, Frame},
@@ -41,31 +41,36 @@ use crate::{
     triangle::{Block, LANES},
 };
 
-/// Fewer rays than this go on one by one from where they are. From 2 to 5, times differed by less than the noise.
+/// Fewer rays than this go on one by one from where they are. With AVX-512, 3 took 1.05 times as long, 6 took 1.03 times.
 const FEW: u32 = 4;
 
 /// Fewer rays than this are tested one by one against eight triangles, others all together against one after another.
 const FEWEST: u32 = 3;
 
-/// Rays of a packet.
-const SIZE: usize = 16;
+/// Vectors of sixteen rays in a packet where one is one register, and where it is two. The more there are, the less a
+/// packet costs beside its arithmetic, in branches above all that nobody can predict. Against one (Zen 5), two took 1/1.16
+/// of the time and four 1/1.2 with AVX-512, ambient occlusion in six scenes; with AVX2 two took 1/1.04 and four 1.02 times.
+const PARTS: [usize; 2] = [4, 2];
+
+/// Most rays of a packet.
+const MOST: usize = RAYS * PARTS[0];
 
 /// A subtree, and which rays are to visit it.
 #[derive(Debug, Clone, Copy)]
 struct Visit {
     node: NodeRef,
-    rays: u32,
+    rays: u64,
 }
 
 /// What packets remember things in, reused from one to the next.
 pub struct Memory {
     visits: Vec<Visit>,
-    frames: [[Frame; LANES]; 2],
+    frames: [Frame; MOST],
 }
 
 impl Default for Memory {
     fn default() -> Self {
-        Self { visits: Vec::new(), frames: [[Frame::zeroed(); LANES]; 2] }
+        Self { visits: Vec::new(), frames: [Frame::zeroed(); MOST] }
     }
 }
 
@@ -78,27 +83,43 @@ pub fn each<S: Simd, T: Take + ?Sized, const GRIDS: bool>(
     simd: S,
     tracer: Tracer<'_>,
     rays: &Rays<'_>,
+    room: (&mut Memory, &mut [Entry]),
+    to: (&mut T, usize),
+) -> Result<(), Error> {
+    if S::IS_WIDE {
+        each_of::<S, T, GRIDS, { PARTS[0] }>(simd, tracer, rays, room, to)
+    } else {
+        each_of::<S, T, GRIDS, { PARTS[1] }>(simd, tracer, rays, room, to)
+    }
+}
+
+/// The same in packets of so many parts.
+#[inline(always)]
+fn each_of<S: Simd, T: Take + ?Sized, const GRIDS: bool, const PARTS: usize>(
+    simd: S,
+    tracer: Tracer<'_>,
+    rays: &Rays<'_>,
     (memory, stack): (&mut Memory, &mut [Entry]),
     (to, place): (&mut T, usize),
 ) -> Result<(), Error> {
     let Tracer { structure, mesh, .. } = tracer;
     let scene = (structure, structure.view());
-    for first in (0..rays.len()).step_by(SIZE) {
-        if first + SIZE <= rays.len()
-            && let Some(frames) = Frames::new(simd.wide(), &rays.sixteen(simd, first), &structure.domain)
-        {
-            let hit = trace::<S, GRIDS>(simd, scene, mesh, (&frames, rays, first), memory, stack);
-            for half in [0, LANES] {
+    let (size, domain) = (RAYS * PARTS, &structure.domain);
+    let mut frames = [Frames::none(simd.wide()); PARTS];
+    for first in (0..rays.len()).step_by(size) {
+        if set(simd, &mut frames, (rays, first), domain) {
+            let hit = trace::<S, GRIDS, PARTS>(simd, scene, mesh, (&frames, rays, first), memory, stack);
+            for eight in (0..size).step_by(LANES) {
                 let mut hits = Eight::MISSES;
                 for lane in 0..LANES {
-                    hits.primitive[lane] = if hit >> (half + lane) & 1 == 1 { 0 } else { MISS };
+                    hits.primitive[lane] = if hit >> (eight + lane) & 1 == 1 { 0 } else { MISS };
                 }
-                to.take_eight(place + first + half, &hits);
+                to.take_eight(place + first + eight, &hits);
             }
             continue;
         }
-        for index in first..rays.len().min(first + SIZE) {
-            let frame = rays.frame(index, &structure.domain)?;
+        for index in first..rays.len().min(first + size) {
+            let frame = rays.frame(index, domain)?;
             let hit = kernel::trace::<S, Silent, GRIDS, true>(simd, scene, mesh, &frame, stack, &mut Silent);
             to.take(place + index, hit);
         }
@@ -106,16 +127,37 @@ pub fn each<S: Simd, T: Take + ?Sized, const GRIDS: bool>(
     Ok(())
 }
 
-/// Which of sixteen rays, from `first` on, hit anything.
+/// Find the frames of the rays from `first` on; false where there are too few rays, or one has none. In place: to return
+/// them would copy some kilobytes.
 #[inline(always)]
-fn trace<S: Simd, const GRIDS: bool>(
+fn set<S: Simd, const PARTS: usize>(
+    simd: S,
+    frames: &mut [Frames<S::Wide>; PARTS],
+    (rays, first): (&Rays<'_>, usize),
+    domain: &Domain,
+) -> bool {
+    if first + RAYS * PARTS > rays.len() {
+        return false;
+    }
+    for part in 0..PARTS {
+        match Frames::new(simd.wide(), &rays.sixteen(simd, first + RAYS * part), domain) {
+            Some(found) => frames[part] = found,
+            None => return false,
+        }
+    }
+    true
+}
+
+/// Which of the rays from `first` on hit anything.
+#[inline(always)]
+fn trace<S: Simd, const GRIDS: bool, const PARTS: usize>(
     simd: S,
     (structure, root): (&Structure, View<'_>),
     mesh: &Mesh,
-    (frames, rays, first): (&Frames<S::Wide>, &Rays<'_>, usize),
+    (frames, rays, first): (&[Frames<S::Wide>; PARTS], &Rays<'_>, usize),
     memory: &mut Memory,
     stack: &mut [Entry],
-) -> u32 {
+) -> u64 {
     let packet = Packet::new(simd, frames, rays.origin(first), &structure.domain);
     let Memory { visits, frames: apart } = memory;
     let mut are_written = false;
@@ -151,12 +193,10 @@ fn trace<S: Simd, const GRIDS: bool>(
             _ if going == 0 => {}
             _ => {
                 if !are_written {
-                    let halves = Frames::halves(simd, frames);
-                    halves[0].store(simd, &mut apart[0]);
-                    halves[1].store(simd, &mut apart[1]);
+                    write(simd, frames, apart);
                     are_written = true;
                 }
-                open &= !alone::<S, GRIDS>(simd, structure, mesh, (here, node), (apart.as_flattened(), going), stack);
+                open &= !alone::<S, GRIDS>(simd, structure, mesh, (here, node), (apart, going), stack);
             }
         }
         if open == 0 {
@@ -166,10 +206,28 @@ fn trace<S: Simd, const GRIDS: bool>(
     all & !open
 }
 
+/// Write the frames of rays one by one.
+#[inline(always)]
+fn write<S: Simd>(simd: S, frames: &[Frames<S::Wide>], to: &mut [Frame; MOST]) {
+    let (eights, _) = to.as_chunks_mut();
+    for (frames, eights) in frames.iter().zip(eights.chunks_exact_mut(2)) {
+        let halves = Frames::halves(simd, frames);
+        halves[0].store(simd, &mut eights[0]);
+        halves[1].store(simd, &mut eights[1]);
+    }
+}
+
 /// Remember the children that some of the rays `going` meet, leaves last, so that they are visited first, and among each
 /// the largest last.
 #[inline(always)]
-fn push<S: Simd>(simd: S, packet: &Packet<S>, here: View<'_>, node: &Node, going: u32, visits: &mut Vec<Visit>) {
+fn push<S: Simd, const PARTS: usize>(
+    simd: S,
+    packet: &Packet<S, PARTS>,
+    here: View<'_>,
+    node: &Node,
+    going: u64,
+    visits: &mut Vec<Visit>,
+) {
     let near = packet.near(simd, node);
     let leaves = node.leaves();
     for mut rest in [near & !leaves, near & leaves] {
@@ -200,7 +258,7 @@ struct Leaf<'a> {
 impl Leaf<'_> {
     /// Which of the rays `going` hit one of the triangles.
     #[inline(always)]
-    fn hit<S: Simd>(&self, simd: S, packet: &Packet<S>, going: u32) -> u32 {
+    fn hit<S: Simd, const PARTS: usize>(&self, simd: S, packet: &Packet<S, PARTS>, going: u64) -> u64 {
         let mut near = leaf::near(simd, packet, self.block) & ((1 << self.count) - 1);
         if near == 0 {
             return 0;
@@ -215,7 +273,7 @@ impl Leaf<'_> {
             while unclear != 0 {
                 let ray = unclear.trailing_zeros();
                 unclear &= unclear - 1;
-                rest &= !(u32::from(self.is_hit(lane, ray as usize)) << ray);
+                rest &= !(u64::from(self.is_hit(lane, ray as usize)) << ray);
             }
             if rest == 0 {
                 break;
@@ -239,21 +297,21 @@ fn alone<S: Simd, const GRIDS: bool>(
     structure: &Structure,
     mesh: &Mesh,
     (here, node): (View<'_>, NodeRef),
-    (apart, rays): (&[Frame], u32),
+    (apart, rays): (&[Frame; MOST], u64),
     stack: &mut [Entry],
-) -> u32 {
+) -> u64 {
     let (mut rest, mut hit) = (rays, 0);
     while rest != 0 {
         let lane = rest.trailing_zeros();
         rest &= rest - 1;
-        let (frame, mut silent) = (&apart[lane as usize & (SIZE - 1)], Silent);
+        let (frame, mut silent) = (&apart[lane as usize % MOST], Silent);
         let mut search = Search::new(simd, frame, mesh, &mut silent, Best::none(frame.tmax));
         if let Target::Leaf { block, count } = node.target() {
             search.block::<true>(&here.blocks[block as usize], count);
         } else {
             kernel::trace_below::<S, Silent, GRIDS, true>(&mut search, structure, (here, node), stack);
         }
-        hit |= u32::from(search.best.primitive != MISS) << lane;
+        hit |= u64::from(search.best.primitive != MISS) << lane;
     }
     hit
 }

@@ -1,4 +1,4 @@
-//! Sixteen rays, and the boxes of nodes as they see them.
+//! Some rays, and the boxes of nodes as they see them.
 
 use crate::{
     accel::structure::Node,
@@ -15,16 +15,13 @@ const MARGIN: f32 = 64.0 * ROUNDING;
 
 type Vector<S> = <<S as Simd>::Wide as Arithmetic>::F32;
 
-/// Sixteen rays.
-pub struct Packet<S: Simd> {
+/// Rays of a vector.
+pub const RAYS: usize = 16;
+
+/// Some rays, as many vectors of them as there are parts; masks have a bit for each.
+pub struct Packet<S: Simd, const PARTS: usize> {
     pub wide: S::Wide,
-    inverse: [Vector<S>; 3],
-    /// What is added to `plane * inverse` for lower and for upper planes.
-    bias: [[Vector<S>; 3]; 2],
-    pub tmin: Vector<S>,
-    pub tmax: Vector<S>,
-    pub origin: [Vector<S>; 3],
-    pub direction: [Vector<S>; 3],
+    pub parts: [Part<S>; PARTS],
     /// The origin of the first ray.
     pub first: [f32; 3],
     /// How far other origins are from it, in any coordinate.
@@ -35,33 +32,30 @@ pub struct Packet<S: Simd> {
     pub around: [f32; 6],
 }
 
-impl<S: Simd> Packet<S> {
+/// Sixteen of them.
+#[derive(Clone, Copy)]
+pub struct Part<S: Simd> {
+    inverse: [Vector<S>; 3],
+    /// What is added to `plane * inverse` for lower and for upper planes.
+    bias: [[Vector<S>; 3]; 2],
+    pub tmin: Vector<S>,
+    pub tmax: Vector<S>,
+    pub origin: [Vector<S>; 3],
+    pub direction: [Vector<S>; 3],
+}
+
+impl<S: Simd, const PARTS: usize> Packet<S, PARTS> {
     #[inline(always)]
-    pub fn new(simd: S, frames: &Frames<S::Wide>, first: [f32; 3], domain: &Domain) -> Self {
-        let wide = simd.wide();
-        let zero = wide.splat(0.0);
-        let (mut reach, mut spread) = (zero, zero);
-        let mut bias = [[zero; 3]; 2];
-        for k in 0..3 {
-            let (near, far) = (frames.near_bias[k], frames.far_bias[k]);
-            bias[0][k] = wide.if_ge(frames.inverse[k], zero, near, far);
-            bias[1][k] = wide.if_ge(frames.inverse[k], zero, far, near);
-            reach = wide.max(wide.abs(frames.local[k]), reach);
-            spread = wide.max(wide.abs(wide.sub(frames.origin[k], wide.splat(first[k]))), spread);
+    pub fn new(simd: S, frames: &[Frames<S::Wide>; PARTS], first: [f32; 3], domain: &Domain) -> Self {
+        let mut parts = [Part::new(simd.wide(), &frames[0]); PARTS];
+        let mut sides = sides(simd, &frames[0], first, domain);
+        for part in 1..PARTS {
+            parts[part] = Part::new(simd.wide(), &frames[part]);
+            let others = self::sides(simd, &frames[part], first, domain);
+            for k in 0..LANES {
+                sides[k] = simd.min(others[k], sides[k]);
+            }
         }
-        let size = wide.add(reach, wide.splat(domain.half_extent));
-        let (most, least) = (wide.add(size, size), wide.sub(zero, wide.add(size, size)));
-        let begin = wide.min(wide.max(frames.tmin, least), most);
-        let end = wide.min(wide.max(frames.tmax, least), most);
-        let margin = wide.mul(size, wide.splat(MARGIN));
-        let mut sides = [simd.splat(0.0); LANES];
-        for k in 0..3 {
-            let from = wide.mul_add(frames.direction[k], begin, frames.local[k]);
-            let to = wide.mul_add(frames.direction[k], end, frames.local[k]);
-            sides[k] = Self::least(simd, wide.sub(wide.min(from, to), margin));
-            sides[3 + k] = Self::least(simd, wide.sub(zero, wide.add(wide.max(from, to), margin)));
-        }
-        sides[6] = Self::least(simd, wide.sub(zero, spread));
         let rows = simd.transpose(sides);
         let mut sides = rows[0];
         for lane in 1..LANES {
@@ -73,21 +67,18 @@ impl<S: Simd> Packet<S> {
             let local = first[k] - domain.centre[k];
             (around[k], around[3 + k]) = (sides[k] - local, sides[3 + k] + local);
         }
-        let Frames { inverse, tmin, tmax, direction, origin, .. } = *frames;
-        Self { wide, inverse, bias, tmin, tmax, origin, direction, first, spread: -sides[6], sides, around }
-    }
-
-    /// The lesser of each pair of rays.
-    #[inline(always)]
-    fn least(simd: S, values: Vector<S>) -> S::F32 {
-        let [low, high] = simd.halves(values);
-        simd.min(low, high)
+        Self { wide: simd.wide(), parts, first, spread: -sides[6], sides, around }
     }
 
     /// The rays whose interval is not empty.
     #[inline(always)]
-    pub fn all(&self) -> u32 {
-        self.wide.le(self.tmin, self.tmax)
+    pub fn all(&self) -> u64 {
+        let mut all = 0;
+        for part in 0..PARTS {
+            let Part { tmin, tmax, .. } = self.parts[part];
+            all |= u64::from(self.wide.le(tmin, tmax)) << (RAYS * part);
+        }
+        all
     }
 
     /// The children whose boxes meet the one around the segments.
@@ -104,8 +95,66 @@ impl<S: Simd> Packet<S> {
 
     /// The rays that meet a child.
     #[inline(always)]
-    pub fn meet(&self, node: &Node, child: usize) -> u32 {
-        let wide = self.wide;
+    pub fn meet(&self, node: &Node, child: usize) -> u64 {
+        let mut met = 0;
+        for part in 0..PARTS {
+            met |= u64::from(self.parts[part].meet(self.wide, node, child)) << (RAYS * part);
+        }
+        met
+    }
+}
+
+/// The box around the segments of sixteen rays, and how far their origins are from the first one's, as [`Packet::sides`]:
+/// the least number of each row.
+#[inline(always)]
+fn sides<S: Simd>(simd: S, frames: &Frames<S::Wide>, first: [f32; 3], domain: &Domain) -> [S::F32; LANES] {
+    let wide = simd.wide();
+    let zero = wide.splat(0.0);
+    let (mut reach, mut spread) = (zero, zero);
+    for k in 0..3 {
+        reach = wide.max(wide.abs(frames.local[k]), reach);
+        spread = wide.max(wide.abs(wide.sub(frames.origin[k], wide.splat(first[k]))), spread);
+    }
+    let size = wide.add(reach, wide.splat(domain.half_extent));
+    let (most, least) = (wide.add(size, size), wide.sub(zero, wide.add(size, size)));
+    let begin = wide.min(wide.max(frames.tmin, least), most);
+    let end = wide.min(wide.max(frames.tmax, least), most);
+    let margin = wide.mul(size, wide.splat(MARGIN));
+    let mut sides = [simd.splat(0.0); LANES];
+    for k in 0..3 {
+        let from = wide.mul_add(frames.direction[k], begin, frames.local[k]);
+        let to = wide.mul_add(frames.direction[k], end, frames.local[k]);
+        sides[k] = lesser(simd, wide.sub(wide.min(from, to), margin));
+        sides[3 + k] = lesser(simd, wide.sub(zero, wide.add(wide.max(from, to), margin)));
+    }
+    sides[6] = lesser(simd, wide.sub(zero, spread));
+    sides
+}
+
+/// The lesser of each pair of rays.
+#[inline(always)]
+fn lesser<S: Simd>(simd: S, values: Vector<S>) -> S::F32 {
+    let [low, high] = simd.halves(values);
+    simd.min(low, high)
+}
+
+impl<S: Simd> Part<S> {
+    #[inline(always)]
+    fn new(wide: S::Wide, frames: &Frames<S::Wide>) -> Self {
+        let zero = wide.splat(0.0);
+        let mut bias = [[zero; 3]; 2];
+        for k in 0..3 {
+            let (near, far) = (frames.near_bias[k], frames.far_bias[k]);
+            bias[0][k] = wide.if_ge(frames.inverse[k], zero, near, far);
+            bias[1][k] = wide.if_ge(frames.inverse[k], zero, far, near);
+        }
+        let Frames { inverse, tmin, tmax, direction, origin, .. } = *frames;
+        Self { inverse, bias, tmin, tmax, origin, direction }
+    }
+
+    /// Those that meet a child.
+    #[inline(always)]
+    fn meet(&self, wide: S::Wide, node: &Node, child: usize) -> u32 {
         let (mut near, mut far) = (self.tmin, self.tmax);
         for k in 0..3 {
             let lower = wide.splat(node.plane[k][child & (LANES - 1)]);
