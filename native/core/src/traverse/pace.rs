@@ -44,7 +44,7 @@ const FEW: usize = 1 << 16;
 /// Where any hit will do: packets and streams differ by less than half, and a stream must be long to show what it can. To
 /// gather and sort its rays takes as long as the cheapest packets, which are not compared: they see large triangles, and
 /// ambient occlusion there (hospital, vianney, room) takes 1/1.05 to 1/1.09 of the time.
-const PACKETS: Terms = Terms { tiles: 2, stream: 8 * STREAM, cheap: 30.0, slow: 4.0, term: 1 << 17, retry: 1 << 17 };
+const PACKETS: Terms = Terms { tiles: 2, stream: 8 * STREAM, cheap: 20.0, slow: 4.0, term: 1 << 17, retry: 1 << 17 };
 
 /// Nanoseconds a ray that are expected of a stream where none was compared.
 const UNKNOWN: f64 = 150.0;
