@@ -60,7 +60,7 @@ impl Ways {
     }
 }
 
-/// A node side by side with others, and how many places it has where it is [one without children](Binary::costs).
+/// A node side by side with others, and how many places it has where it is [one without children](Weighed::costs).
 pub type Place = (usize, usize);
 
 impl Collapse {

@@ -76,7 +76,7 @@ impl Divided {
         self.draft.triangles
     }
 
-    /// See [`Binary::costs`].
+    /// See [`Weighed::costs`].
     pub fn costs(&self) -> [f32; LANES] {
         self.costs
     }
