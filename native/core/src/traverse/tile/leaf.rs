@@ -59,7 +59,8 @@ impl Planes {
         }
     }
 
-    /// Test the first `count` triangles against groups.
+    /// Test the first `count` triangles against groups. Two groups at a time, for half of the branches, took 1/1.06 of the
+    /// time on hair and in Sponza, and 1.15 times on the dragon (Zen 5).
     #[inline(always)]
     pub fn test<S: Simd>(&self, simd: S, tile: &mut Tile, mesh: &Mesh, block: &Block, count: u32, groups: u32) {
         let mut groups = groups;
