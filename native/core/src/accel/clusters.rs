@@ -3,7 +3,7 @@
 //! for Bounding Volume Hierarchy Construction", TVCG 24(3), 2018; as its distance, the area of the box around both.
 //!
 //! Measured against the surface area heuristic over single triangles by the expected cost of the tree: 2% less (Sibenik,
-//! vianney_house, Sponza), equal (room, stadium, hospital, soup, hair), 1 to 2.5% more (dragon, saw, horse, city, bunny).
+//! vianney_house), equal (room, stadium, hospital, Sponza, soup, hair), 1 to 2.5% more (dragon, saw, horse, city, bunny).
 //! Fetching the corners, which miss the cache, is two thirds of the time of clustering; fetching them in a loop of their own
 //! did not help, nor did comparing with 8 neighbours to either side instead of 15.
 

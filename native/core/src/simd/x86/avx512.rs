@@ -117,7 +117,9 @@ impl Simd for Avx512 {
         unsafe { enter_avx512(self, kernel) }
     }
     vectors!();
-    /// Near and far planes in turns, the latter with their sign changed, so that both are the greatest of four numbers.
+    /// Near and far planes in turns, the latter with their sign changed, so that both are the greatest of four numbers: half
+    /// of the operations. In streams that took as long on a Xeon (0.96 to 1.04), whose vectors of 512 bits have fewer units,
+    /// and 1/1.05 of the time on a Zen 5.
     #[inline(always)]
     fn meet(
         self,

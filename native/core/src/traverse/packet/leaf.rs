@@ -26,7 +26,8 @@ pub fn near<S: Simd, const PARTS: usize>(simd: S, packet: &Packet<S, PARTS>, blo
 }
 
 /// Which of the rays `going` certainly hit the triangle in a lane, and of which the exact test is to be asked. No part is
-/// passed by where none of its rays may: branches that cannot be predicted took 1.02 to 1.2 times as long.
+/// passed by where none of its rays may: with branches, which cannot be predicted, the room took 1.01 and 1.2 times as long,
+/// five other scenes 0.93 to 1.08.
 #[inline(always)]
 pub fn hit<S: Simd, const PARTS: usize>(
     triangles: &Triangles,
