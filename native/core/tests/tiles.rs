@@ -10,6 +10,8 @@ use std::sync::Arc;
 
 every_walk!([
     soups_from_outside_and_inside,
+    in_blocks_of_any_side,
+    where_squares_break_off,
     at_corners_and_edges,
     from_corners_and_planes,
     intervals_that_end_anywhere,
@@ -23,14 +25,19 @@ fn mesh((vertices, triangles): (Vec<Vec3>, Vec<[u32; 3]>), place: impl Fn(Vec3) 
 
 /// Rays through a square image in blocks of 8 by 8, as a renderer asks; lengths differ.
 fn image(eye: Vec3, forward: Vec3, slope: f32, edge: usize) -> RayBatch {
+    in_blocks(eye, forward, slope, edge, 8)
+}
+
+/// The same in blocks of `side` by `side`.
+fn in_blocks(eye: Vec3, forward: Vec3, slope: f32, edge: usize, side: usize) -> RayBatch {
     let right = forward.any_orthonormal_vector() * slope;
     let up = forward.cross(right);
     let mut rays = RayBatch::default();
     let place = |index: usize| (index as f32 + 0.37) / edge as f32 * 2.0 - 1.0;
     for index in 0..edge * edge {
-        let (block, inside) = (index / 64, index % 64);
-        let x = block % (edge / 8) * 8 + inside % 8;
-        let y = block / (edge / 8) * 8 + inside / 8;
+        let (block, inside) = (index / (side * side), index % (side * side));
+        let x = block % (edge / side) * side + inside % side;
+        let y = block / (edge / side) * side + inside / side;
         let direction = forward + right * place(x) + up * place(y);
         rays.push(eye, direction * (1.0 + (index % 5) as f32), 0.0, f32::INFINITY);
     }
@@ -46,6 +53,32 @@ fn soups_from_outside_and_inside(walk: &Walk) {
         (Vec3::splat(0.5), Vec3::new(-0.5, 0.55, 0.45), 3.0),
     ] {
         walk.agrees(&mesh, &image(eye, forward.normalize(), slope, 32));
+    }
+}
+
+fn in_blocks_of_any_side(walk: &Walk) {
+    let mesh = mesh(soup(2000, 0.12), |v| v);
+    for side in [1, 2, 4, 8, 16, 32, 64] {
+        walk.agrees(&mesh, &in_blocks(Vec3::new(0.4, 0.6, -1.5), Vec3::new(0.05, -0.02, 1.0), 0.4, 64, side));
+    }
+}
+
+/// One ray among many starts elsewhere, goes back, or is slanted.
+fn where_squares_break_off(walk: &Walk) {
+    let mesh = mesh(soup(2000, 0.12), |v| v);
+    for (side, odd) in [(8, 100), (8, 255), (16, 37), (16, 240), (32, 511), (32, 256)] {
+        let (all, mut rays) = (in_blocks(Vec3::new(0.4, 0.6, -1.5), Vec3::Z, 0.4, 32, side), RayBatch::default());
+        for index in 0..all.len() {
+            let ray = all.ray(index);
+            let (origin, direction) = match index {
+                _ if index == odd => (ray.origin + Vec3::X * 0.1, ray.direction),
+                _ if index == odd + 300 => (ray.origin, -ray.direction),
+                _ if index == odd + 400 => (ray.origin, Vec3::new(1.5, 0.3, 1.0)),
+                _ => (ray.origin, ray.direction),
+            };
+            rays.push(origin, direction, 0.0, f32::INFINITY);
+        }
+        walk.agrees(&mesh, &rays);
     }
 }
 

@@ -109,6 +109,15 @@ pub trait Simd: Arithmetic {
         let half = |k: usize, half: usize| self.load(&std::array::from_fn(|row| rows[8 * half + row][k]));
         std::array::from_fn(|k| self.both([half(k, 0), half(k, 1)]))
     }
+    /// The even and the odd quads of lanes of both: of four rows of eight lanes, two by two, squares of four by four. Of
+    /// four rows of sixteen, squares of rows' squares are that.
+    #[inline(always)]
+    fn squares(self, [upper, lower]: [<Self::Wide as Arithmetic>::F32; 2]) -> [<Self::Wide as Arithmetic>::F32; 2] {
+        let ([a, b], [c, d]) = (self.halves(upper), self.halves(lower));
+        let rows: [[[f32; 4]; 2]; 4] = bytemuck::cast([self.store(a), self.store(b), self.store(c), self.store(d)]);
+        let [[a, e], [b, f], [c, g], [d, h]] = &rows;
+        [self.both([self.join(a, b), self.join(c, d)]), self.both([self.join(e, f), self.join(g, h)])]
+    }
     /// Rows to columns.
     fn transpose(self, rows: [Self::F32; 8]) -> [Self::F32; 8];
     /// The same numbers in double precision.

@@ -15,6 +15,8 @@ impl Neon {
     }
 }
 
+/// Never inlined: a kernel that another one runs now and then is to keep its code and registers to itself.
+#[inline(never)]
 #[target_feature(enable = "neon")]
 fn enter_neon<K: Kernel>(token: Neon, kernel: K) -> K::Output {
     kernel.run(token)

@@ -187,12 +187,10 @@ impl<'a, T: Take + ?Sized, const ANY: bool> Together<'a, T, ANY> {
             return 0;
         }
         tile::trace::<S, GRIDS>(simd, structure, mesh, tile, visits, stack);
-        for group in 0..tile.count {
-            for half in [0, LANES] {
-                let mut hits = Eight::MISSES;
-                tile.hits(simd, mesh, group, half, &mut hits);
-                self.to.take_eight(first + group * tile::RAYS + half, &hits);
-            }
+        for eight in (0..taken).step_by(LANES) {
+            let mut hits = Eight::MISSES;
+            tile.hits(simd, mesh, eight, &mut hits);
+            self.to.take_eight(first + eight, &hits);
         }
         self.trial.traced_tile(start, taken);
         taken

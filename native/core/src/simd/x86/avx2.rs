@@ -21,6 +21,8 @@ impl Avx2 {
     }
 }
 
+/// Never inlined: a kernel that another one runs now and then is to keep its code and registers to itself.
+#[inline(never)]
 #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
 fn enter_avx2<K: Kernel>(token: Avx2, kernel: K) -> K::Output {
     kernel.run(token)

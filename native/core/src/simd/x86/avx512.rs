@@ -25,6 +25,8 @@ impl Avx512 {
     }
 }
 
+/// Never inlined: a kernel that another one runs now and then is to keep its code and registers to itself.
+#[inline(never)]
 #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt,avx512f,avx512bw,avx512dq,avx512vl,avx512vbmi2")]
 fn enter_avx512<K: Kernel>(token: Avx512, kernel: K) -> K::Output {
     kernel.run(token)
@@ -72,6 +74,13 @@ impl Simd for Avx512 {
     fn halves(self, value: __m512) -> [__m256; 2] {
         // SAFETY: as for `both`.
         unsafe { [_mm512_castps512_ps256(value), _mm512_extractf32x8_ps::<1>(value)] }
+    }
+    #[inline(always)]
+    fn squares(self, [upper, lower]: [__m512; 2]) -> [__m512; 2] {
+        // SAFETY: as for `both`.
+        unsafe {
+            [_mm512_shuffle_f32x4::<0b10_00_10_00>(upper, lower), _mm512_shuffle_f32x4::<0b11_01_11_01>(upper, lower)]
+        }
     }
     #[inline(always)]
     fn load_wide(self, values: &[f32; 16]) -> __m512 {

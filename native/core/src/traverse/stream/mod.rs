@@ -21,7 +21,7 @@ use super::{frame::Slabs, kernel, leaf::Search, probe::Silent, tile::EXTENTS};
 use crate::{
     Mesh,
     accel::structure::{Node, NodeRef, Structure, Target, View},
-    simd::{MOST_GROUP, Simd},
+    simd::{Kernel, MOST_GROUP, Simd},
     triangle::LANES,
 };
 
@@ -97,7 +97,7 @@ pub fn trace<S: Simd, const GRIDS: bool, const ANY: bool>(
             }
             _ => {
                 for &id in &lists.ids[ids] {
-                    Single { bin, id: id as usize }.trace::<S, GRIDS, ANY>(simd, structure, mesh, (here, node), stack);
+                    simd.run(Single::<GRIDS, ANY> { bin, id: id as usize, structure, mesh, node: (here, node), stack });
                 }
             }
         }
@@ -226,31 +226,30 @@ impl<S: Simd> OctantPlanes<S> {
     }
 }
 
-/// One ray of a bin.
-struct Single<'a> {
+/// One ray of a bin that goes on alone below a node.
+struct Single<'a, const GRIDS: bool, const ANY: bool> {
     bin: &'a mut Bin,
     id: usize,
+    structure: &'a Structure,
+    mesh: &'a Mesh,
+    node: (View<'a>, NodeRef),
+    stack: &'a mut [kernel::Entry],
 }
 
-impl Single<'_> {
-    /// Go on alone below a node.
+impl<const GRIDS: bool, const ANY: bool> Kernel for Single<'_, GRIDS, ANY> {
+    type Output = ();
+
     #[inline(always)]
-    fn trace<S: Simd, const GRIDS: bool, const ANY: bool>(
-        self,
-        simd: S,
-        structure: &Structure,
-        mesh: &Mesh,
-        node: (View<'_>, NodeRef),
-        stack: &mut [kernel::Entry],
-    ) {
-        if self.bin.has_ended(self.id) {
+    fn run<S: Simd>(self, simd: S) {
+        let Self { bin, id, structure, mesh, node, stack } = self;
+        if bin.has_ended(id) {
             return;
         }
-        let frame = &self.bin.frame(self.id);
+        let frame = &bin.frame(id);
         let mut silent = Silent;
-        let mut search = Search::new(simd, frame, mesh, &mut silent, self.bin.best(self.id));
+        let mut search = Search::new(simd, frame, mesh, &mut silent, bin.best(id));
         kernel::trace_below::<S, Silent, GRIDS, ANY>(&mut search, structure, node, stack);
         let best = search.best;
-        self.bin.keep::<ANY>(self.id, best);
+        bin.keep::<ANY>(id, best);
     }
 }

@@ -1,6 +1,6 @@
 //! Blocks of triangles against groups of rays.
 
-use super::{ROUNDING, rays::Tile};
+use super::{ROUNDING, decide::Decide, rays::Tile};
 use crate::{
     Mesh,
     simd::{Arithmetic, Simd},
@@ -146,7 +146,7 @@ impl Planes {
             rays.best = simd.store_wide(wide.if_ge(low, certain, wide.splat(winner), best));
         }
         let unclear = possible & !accepted & !beyond;
-        let decided = unclear != 0 && tile.decide(simd, mesh, group, unclear, block, lane);
+        let decided = unclear != 0 && simd.run(Decide { tile, mesh, group, lanes: unclear, block, triangle: lane });
         decided || accepted != 0
     }
 }

@@ -30,6 +30,8 @@
 //! Of two candidates whose depths do not overlap with these errors the nearer wins; in every other case the exact test
 //! decides at once. The winners' parameters and weights are computed at the end, by the exact arithmetic.
 
+mod alone;
+mod decide;
 mod frustum;
 mod leaf;
 mod rays;
@@ -37,6 +39,7 @@ mod resolve;
 mod spans;
 
 use self::{
+    alone::Alone,
     frustum::{Boxes, Projector},
     leaf::Planes,
 };
@@ -140,7 +143,10 @@ pub fn trace<S: Simd, const GRIDS: bool>(
                 planes.set(simd, tile, block);
                 planes.test(simd, tile, mesh, block, count, groups);
             }
-            _ => tile.one_by_one::<S, GRIDS>(simd, structure, mesh, (here, node), groups, stack),
+            _ => {
+                let node = (here, node);
+                simd.run(Alone::<GRIDS> { tile, structure, mesh, node, groups, stack });
+            }
         }
     }
 }

@@ -13,6 +13,48 @@ use crate::{
 /// The least groups worth a tile.
 const FEWEST: usize = 2;
 
+/// Rays along a side of a square group.
+pub const QUAD: usize = 4;
+
+/// Four rays of a group that follow each other in the batch.
+#[derive(Debug, Clone, Copy)]
+pub struct Quad {
+    pub group: usize,
+    /// Its number in the group.
+    pub quad: usize,
+}
+
+/// How many quads there are in the rows of a picture that the rays from `first` on, as many as a tile holds, seem to come
+/// in, as a power of two; 0 where they come otherwise.
+#[inline(always)]
+fn quads_across(rays: &Rays<'_>, first: usize) -> u32 {
+    for across in 1..=QUAD as u32 {
+        let row = QUAD << across;
+        if 4.0 * away(rays, first, row) < away(rays, first, row / 2) {
+            return across;
+        }
+    }
+    0
+}
+
+/// The square of the distance of two directions.
+#[inline(always)]
+fn away(rays: &Rays<'_>, first: usize, by: usize) -> f32 {
+    (rays.get(first + by).direction - rays.get(first).direction).length_squared()
+}
+
+type Columns<S> = [<<S as Simd>::Wide as Arithmetic>::F32; 8];
+
+/// See [`Simd::squares`].
+#[inline(always)]
+fn squares<S: Simd>(simd: S, upper: &Columns<S>, lower: &Columns<S>) -> [Columns<S>; 2] {
+    let [mut left, mut right] = [*upper, *lower];
+    for column in 0..8 {
+        [left[column], right[column]] = simd.squares([upper[column], lower[column]]);
+    }
+    [left, right]
+}
+
 /// A ray is never this much steeper along another axis than along the tile's: its slopes are at most 2.
 const SLANT: f32 = 0.5;
 
@@ -48,6 +90,9 @@ pub struct Exactly {
 pub struct Tile {
     /// Groups in use.
     pub count: usize,
+    /// Quads in the rows of rays that groups are squares of, as a power of two; 0 where groups are sixteen that follow each
+    /// other in the batch. Squares meet fewer boxes and triangles than strips of one or two rows.
+    across: u32,
     /// Axes x, y and z; rays go along z, and the others follow in cyclic order.
     pub axes: [usize; 3],
     /// Whether rays rise (1) or fall (-1) along z.
@@ -87,6 +132,7 @@ impl Default for Tile {
     fn default() -> Self {
         Self {
             count: 0,
+            across: 0,
             axes: [0, 1, 2],
             sign: 1.0,
             origin: [0.0; 3],
@@ -116,8 +162,17 @@ impl Tile {
         if most < FEWEST || !self.begin(rays, first, domain) {
             return 0;
         }
-        while self.count < most && self.add(simd, rays, first + self.count * RAYS) {
-            self.count += 1;
+        self.across = if most == GROUPS { quads_across(rays, first) } else { 0 };
+        let are_square = match self.across {
+            0 => false,
+            1 => self.add_from_eights(simd, rays, first),
+            _ => self.add_from_rows(simd, rays, first),
+        };
+        if !are_square {
+            (self.across, self.count, self.slanted) = (0, 0, 0);
+            while self.count < most && self.add(simd, &rays.sixteen(simd, first + self.count * RAYS)) {
+                self.count += 1;
+            }
         }
         if self.count < FEWEST {
             return 0;
@@ -125,6 +180,56 @@ impl Tile {
         self.slack = if self.slanted == 0 { Slack::STEEP } else { Slack::SLANTED };
         self.span(simd);
         self.count * RAYS
+    }
+
+    /// Add square groups of rays in rows of eight; false where not all of them fit.
+    #[inline(always)]
+    fn add_from_eights<S: Simd>(&mut self, simd: S, rays: &Rays<'_>, first: usize) -> bool {
+        for pair in 0..GROUPS / 2 {
+            let place = first + 2 * RAYS * pair;
+            let groups = squares(simd, &rays.sixteen(simd, place), &rays.sixteen(simd, place + RAYS));
+            if !self.add_all(simd, &groups) {
+                return false;
+            }
+        }
+        true
+    }
+
+    /// The same of longer rows.
+    #[inline(always)]
+    fn add_from_rows<S: Simd>(&mut self, simd: S, rays: &Rays<'_>, first: usize) -> bool {
+        let row = QUAD << self.across;
+        for place in (0..GROUPS * RAYS).step_by(QUAD * row) {
+            for place in (first + place..first + place + row).step_by(RAYS) {
+                let upper = squares(simd, &rays.sixteen(simd, place), &rays.sixteen(simd, place + row));
+                let place = place + 2 * row;
+                let lower = squares(simd, &rays.sixteen(simd, place), &rays.sixteen(simd, place + row));
+                let [even, odd] = [squares(simd, &upper[0], &lower[0]), squares(simd, &upper[1], &lower[1])];
+                if !self.add_all(simd, &[even[0], odd[0], even[1], odd[1]]) {
+                    return false;
+                }
+            }
+        }
+        true
+    }
+
+    /// Add groups; false where one does not fit.
+    #[inline(always)]
+    fn add_all<S: Simd>(&mut self, simd: S, groups: &[Columns<S>]) -> bool {
+        for group in groups {
+            if !self.add(simd, group) {
+                return false;
+            }
+            self.count += 1;
+        }
+        true
+    }
+
+    /// Where four rays that follow each other in the batch are, by their number in the tile.
+    #[inline(always)]
+    pub fn quad(&self, number: usize) -> Quad {
+        let (row, column) = (number >> self.across, number & ((1 << self.across) - 1));
+        Quad { group: (((row / QUAD) << self.across) + column) % GROUPS, quad: row % QUAD }
     }
 
     /// An empty tile around the first ray; false where its origin is no tile's.
@@ -154,8 +259,7 @@ impl Tile {
 
     /// Add a group; false where it does not fit.
     #[inline(always)]
-    fn add<S: Simd>(&mut self, simd: S, rays: &Rays<'_>, first: usize) -> bool {
-        let columns = rays.sixteen(simd, first);
+    fn add<S: Simd>(&mut self, simd: S, columns: &Columns<S>) -> bool {
         let wide = simd.wide();
         let zero = wide.splat(0.0);
         let (mut elsewhere, mut largest, mut direction) = (zero, zero, [zero; 3]);
