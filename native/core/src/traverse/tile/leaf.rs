@@ -86,7 +86,9 @@ impl Planes {
     }
 
     /// The triangles that may be met by some ray with slopes between those of a group. Those behind the group's farthest
-    /// hit are not told apart: to find each triangle's nearest corner and compare it took 1.02 times as long (Zen 4).
+    /// hit are not told apart: to find each triangle's nearest corner and compare it took 1.02 times as long (Zen 4). Nor are
+    /// those whose rectangle of slopes misses the group's: to find and compare it spared scans a third of the tests and took
+    /// 1/1.01 of the time (soup 1/1.08, vianney 1.04 times).
     #[inline(always)]
     fn near<S: Simd>(&self, simd: S, tile: &Tile, group: usize) -> u32 {
         let (spans, group) = (&tile.spans[group / LANES], group % LANES);
