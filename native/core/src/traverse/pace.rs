@@ -3,7 +3,7 @@
 
 use std::{
     sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed},
-    time::Instant,
+    time::{Duration, Instant},
 };
 
 /// Rays of a short stream, which a traverser of few rays is compared with.
@@ -131,7 +131,13 @@ impl Pace {
 pub struct Trial<'p> {
     pace: &'p Pace,
     stage: Stage,
+    /// When the clock was last looked at, and the rays of the tiles since then, if nothing else was done.
+    watch: Option<(Instant, usize)>,
 }
+
+/// While a verdict stands, the clock is not looked at behind a tile of fewer visits than this, which cannot be slow. It takes
+/// some thirty nanoseconds, and two looks a tile took 1/20 of the time where tiles see one large thing.
+const MANY_VISITS: usize = 32;
 
 #[derive(Debug, Clone, Copy)]
 enum Stage {
@@ -146,28 +152,49 @@ enum Stage {
 impl<'p> Trial<'p> {
     /// For a new batch.
     pub fn new(pace: &'p Pace) -> Self {
-        Self { pace, stage: Stage::Serving }
+        Self { pace, stage: Stage::Serving, watch: None }
     }
 
     /// Whether the next rays should make a tile, if they can. A measurement begins where no rays wait, `idle`.
     #[inline]
     pub fn wants_tiles(&mut self, idle: bool) -> bool {
-        match (self.stage, self.pace.turn()) {
+        let wanted = match (self.stage, self.pace.turn()) {
             (Stage::Serving, Turn::Both) if !idle => false,
             (Stage::Serving, Turn::Both) => {
                 self.stage = Stage::Tiles { count: 0, nanoseconds: 0.0 };
+                self.watch = None;
                 true
             }
             (Stage::Serving, turn) => turn == Turn::Tile,
             (Stage::Tiles { .. }, _) => true,
             (Stage::Stream { .. }, _) => false,
+        };
+        if !wanted {
+            self.watch = None;
+        }
+        wanted
+    }
+
+    /// A tile begins.
+    #[inline]
+    pub fn begin_tile(&mut self) {
+        if self.watch.is_none() {
+            self.watch = Some((Instant::now(), 0));
         }
     }
 
-    /// A tile that began then, of so many rays, is done.
+    /// A tile of so many rays is done, which took so many visits.
     #[inline]
-    pub fn traced_tile(&mut self, start: Instant, rays: usize) {
-        let took = per_ray(start, rays);
+    pub fn traced_tile(&mut self, rays: usize, visits: usize) {
+        let Some((start, before)) = self.watch else { return };
+        let rays = before + rays;
+        if matches!(self.stage, Stage::Serving) && visits < MANY_VISITS {
+            self.watch = Some((start, rays));
+            return;
+        }
+        let now = Instant::now();
+        self.watch = Some((now, 0));
+        let took = per_ray(now - start, rays);
         match self.stage {
             Stage::Tiles { count, nanoseconds } => {
                 self.stage = Stage::Tiles { count: count + 1, nanoseconds: nanoseconds + took };
@@ -209,11 +236,12 @@ impl<'p> Trial<'p> {
     /// All bins were traced.
     #[inline]
     pub fn emptied(&mut self) {
+        self.watch = None;
         if let Stage::Stream { tiles, start, rays } = &mut self.stage {
             if *rays == 0 {
                 *start = Instant::now();
             } else {
-                let (tiles, stream) = (*tiles, per_ray(*start, *rays));
+                let (tiles, stream) = (*tiles, per_ray(start.elapsed(), *rays));
                 self.decide(tiles, stream);
             }
         }
@@ -225,9 +253,9 @@ impl<'p> Trial<'p> {
     }
 }
 
-/// Nanoseconds since `start` for each of some rays.
-fn per_ray(start: Instant, rays: usize) -> f64 {
-    start.elapsed().as_secs_f64() * 1e9 / rays as f64
+/// Nanoseconds for each of some rays.
+fn per_ray(duration: Duration, rays: usize) -> f64 {
+    duration.as_secs_f64() * 1e9 / rays as f64
 }
 
 #[cfg(test)]
@@ -260,7 +288,7 @@ mod tests {
         let pace = Pace::new(&TILES);
         pace.decide(20.0, UNKNOWN);
         let mut trial = Trial::new(&pace);
-        trial.traced_tile(Instant::now(), usize::MAX);
+        trace_tile(&mut trial, Instant::now(), 1 << 40);
         assert!(!trial.took(8));
         streams_win(&pace, &mut trial);
     }
@@ -270,10 +298,10 @@ mod tests {
         let pace = Pace::new(&TILES);
         pace.decide(20.0, 50.0);
         let mut trial = Trial::new(&pace);
-        trial.traced_tile(a_millisecond_ago(), 2500); // 400 nanoseconds a ray
+        trace_tile(&mut trial, a_millisecond_ago(), 2500); // 400 nanoseconds a ray
         for _ in 0..TILES.tiles {
             assert!(trial.wants_tiles(true) && !trial.took(8));
-            trial.traced_tile(Instant::now(), usize::MAX);
+            trace_tile(&mut trial, Instant::now(), 1 << 40);
         }
         assert_eq!(pace.turn(), Turn::Tile);
     }
@@ -281,7 +309,7 @@ mod tests {
     /// A very slow tile, and a stream that is faster.
     fn streams_win(pace: &Pace, trial: &mut Trial<'_>) {
         assert!(trial.wants_tiles(true));
-        trial.traced_tile(a_millisecond_ago(), 8);
+        trace_tile(trial, a_millisecond_ago(), 8);
         assert!(trial.took(8));
         trial.emptied();
         assert!(!trial.wants_tiles(true) && trial.took(TILES.stream));
@@ -299,7 +327,26 @@ mod tests {
         assert!(trial.wants_tiles(false));
     }
 
+    #[test]
+    fn tiles_of_few_visits_are_timed_together() {
+        let pace = Pace::new(&TILES);
+        pace.decide(20.0, 50.0);
+        let mut trial = Trial::new(&pace);
+        trial.watch = Some((a_millisecond_ago(), 0));
+        trial.traced_tile(8, MANY_VISITS - 1);
+        assert!(!trial.took(8) && trial.wants_tiles(true));
+        assert!(matches!((trial.stage, trial.watch), (Stage::Serving, Some((_, 8)))));
+        trial.traced_tile(8, MANY_VISITS);
+        assert!(matches!((trial.stage, trial.watch), (Stage::Tiles { count: 1, .. }, Some((_, 0)))));
+    }
+
+    /// A tile of many visits that began then.
+    fn trace_tile(trial: &mut Trial<'_>, start: Instant, rays: usize) {
+        trial.watch = Some((start, 0));
+        trial.traced_tile(rays, MANY_VISITS);
+    }
+
     fn a_millisecond_ago() -> Instant {
-        Instant::now().checked_sub(std::time::Duration::from_millis(1)).unwrap()
+        Instant::now().checked_sub(Duration::from_millis(1)).unwrap()
     }
 }

@@ -1,8 +1,6 @@
 //! Batches whose rays walk together: in streams, sorted by the grid over the rays, or, where they start at one point,
 //! in tiles.
 
-use std::time::Instant;
-
 use super::{
     Tracer, answers,
     batch::Room,
@@ -180,19 +178,19 @@ impl<'a, T: Take + ?Sized, const ANY: bool> Together<'a, T, ANY> {
         if !self.trial.wants_tiles(waiting.is_empty()) || !self.rays.is_common_origin(first) {
             return 0;
         }
-        let start = Instant::now();
+        self.trial.begin_tile();
         let taken = tile.gather(simd, self.rays, first, &structure.domain);
         if taken == 0 {
             self.ripe = first + UNRIPE;
             return 0;
         }
-        tile::trace::<S, GRIDS>(simd, structure, mesh, tile, visits, stack);
+        let count = tile::trace::<S, GRIDS>(simd, structure, mesh, tile, visits, stack);
         for eight in (0..taken).step_by(LANES) {
             let mut hits = Eight::MISSES;
             tile.hits(simd, mesh, eight, &mut hits);
             self.to.take_eight(first + eight, &hits);
         }
-        self.trial.traced_tile(start, taken);
+        self.trial.traced_tile(taken, count);
         taken
     }
 
@@ -210,9 +208,9 @@ impl<'a, T: Take + ?Sized, const ANY: bool> Together<'a, T, ANY> {
             self.ripe = first + UNRIPE;
             return Ok(0);
         }
-        let start = Instant::now();
+        self.trial.begin_tile();
         packet::each::<S, T, GRIDS>(simd, self.tracer, &rays, (packet, stack), (&mut *self.to, first))?;
-        self.trial.traced_tile(start, rays.len());
+        self.trial.traced_tile(rays.len(), usize::MAX);
         Ok(rays.len())
     }
 

@@ -92,7 +92,7 @@ pub struct Visit {
     high: [f32; 2],
 }
 
-/// Find the closest hits of a tile's rays.
+/// Find the closest hits of a tile's rays; returns the number of visits.
 #[inline(always)]
 pub fn trace<S: Simd, const GRIDS: bool>(
     simd: S,
@@ -101,18 +101,19 @@ pub fn trace<S: Simd, const GRIDS: bool>(
     tile: &mut Tile,
     visits: &mut Vec<Visit>,
     stack: &mut [Entry],
-) {
+) -> usize {
     let projector = Projector::new(simd, tile);
     let mut planes = Planes::default();
     visits.clear();
     visits.push(tile.everything(structure.root));
     // Visits from `floor` up are in the lazy cell that the tile is in.
-    let (mut here, mut floor) = (structure.view(), 0);
+    let (mut here, mut floor, mut count) = (structure.view(), 0, 0);
     loop {
         if GRIDS && visits.len() == floor {
             (here, floor) = (structure.view(), 0);
         }
-        let Some(visit) = visits.pop() else { return };
+        let Some(visit) = visits.pop() else { return count };
+        count += 1;
         let mut groups = tile.meeting(simd, &visit);
         if tile.may_miss(&visit) {
             groups = tile.holding(simd, &visit, groups);
