@@ -33,6 +33,7 @@
 mod alone;
 mod decide;
 mod frustum;
+mod gather;
 mod leaf;
 mod rays;
 mod resolve;
