@@ -135,8 +135,9 @@ pub struct Trial<'p> {
     watch: Option<(Instant, usize)>,
 }
 
-/// While a verdict stands, the clock is not looked at behind a tile of fewer visits than this, which cannot be slow. It takes
-/// some thirty nanoseconds, and two looks a tile took 1/20 of the time where tiles see one large thing.
+/// While a verdict stands, the clock is not looked at behind a tile of fewer visits than this, which is not slow. It takes
+/// some thirty nanoseconds, and two looks a tile took 1/20 of the time where tiles see one large thing. A slow tile behind
+/// fast ones is timed with them, so the next one may be the first to tell.
 const MANY_VISITS: usize = 32;
 
 #[derive(Debug, Clone, Copy)]

@@ -93,7 +93,8 @@ pub struct Visit {
     high: [f32; 2],
 }
 
-/// Find the closest hits of a tile's rays; returns the number of visits.
+/// Find the closest hits of a tile's rays; returns the number of visits, of which those of rays that go on one by one are
+/// one each.
 #[inline(always)]
 pub fn trace<S: Simd, const GRIDS: bool>(
     simd: S,
@@ -146,6 +147,7 @@ pub fn trace<S: Simd, const GRIDS: bool>(
                 planes.test(simd, tile, mesh, block, count, groups);
             }
             _ => {
+                count += groups.count_ones() as usize * RAYS;
                 let node = (here, node);
                 simd.run(Alone::<GRIDS> { tile, structure, mesh, node, groups, stack });
             }
