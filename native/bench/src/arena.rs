@@ -2,7 +2,7 @@
 
 use std::{cell::RefCell, num::NonZero, time::Duration};
 
-use espalier_core::{Accelerator, Hits, Job, Method, Rays, pool, traverse::probe::Counts};
+use espalier_core::{Accelerator, Hits, Job, Method, Rays, traverse::probe::Counts, work};
 
 use crate::{
     embree::Device,
@@ -255,7 +255,7 @@ fn one_by_one(
 ) -> Result<(), espalier_core::Error> {
     const PART: usize = 8192;
     let tracer = ours.tracer();
-    pool::for_each(threads, hits.as_mut().parts(PART).enumerate(), &Job::new(), |(part, mut hits)| {
+    work::for_each(threads, hits.as_mut().parts(PART).enumerate(), &Job::new(), |(part, mut hits)| {
         let mut walker = tracer.walker();
         for index in 0..hits.len() {
             hits.set(index, walker.first(&rays.get(part * PART + index))?);

@@ -2,7 +2,7 @@
 
 use std::{cell::RefCell, collections::HashMap, rc::Rc};
 
-use espalier_core::{Hits, Job, pool};
+use espalier_core::{Hits, Job, work};
 
 use crate::{
     embree::{Call, Device, Embree, Scene},
@@ -123,12 +123,12 @@ pub fn trace(
     let job = Job::new();
     match query {
         Query::Closest => {
-            pool::for_each(threads, answer.hits.as_mut().parts(PART).enumerate(), &job, |(part, mut hits)| {
+            work::for_each(threads, answer.hits.as_mut().parts(PART).enumerate(), &job, |(part, mut hits)| {
                 scene.closest(rays, part * PART, &mut hits, call);
                 Ok(())
             })?
         }
-        Query::Any => pool::for_each(threads, answer.blocked.chunks_mut(PART).enumerate(), &job, |(part, blocked)| {
+        Query::Any => work::for_each(threads, answer.blocked.chunks_mut(PART).enumerate(), &job, |(part, blocked)| {
             scene.occluded(rays, part * PART, blocked, call);
             Ok(())
         })?,

@@ -17,6 +17,7 @@ pub mod render;
 pub mod simd;
 pub mod traverse;
 pub mod triangle;
+pub mod work;
 
 pub use accel::{Accelerator, Method, config::Config};
 pub use error::Error;

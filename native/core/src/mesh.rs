@@ -8,8 +8,8 @@ use crate::{
     Error, Job,
     arena::Arena,
     bounds::{Bounds, BoundsA},
-    pool,
     simd::Simd,
+    work,
 };
 
 /// No coordinate may exceed this magnitude: squares of coordinates must stay finite in single precision.
@@ -82,13 +82,13 @@ impl Mesh {
     /// Find faults, what has no area, and the box around the rest.
     fn check(&mut self) -> Result<(), Error> {
         let job = Job::new();
-        pool::for_each(0, self.numbers.chunks(3 * PART).enumerate(), &job, |(part, numbers)| {
+        work::for_each(0, self.numbers.chunks(3 * PART).enumerate(), &job, |(part, numbers)| {
             check_vertices(numbers, part * PART)
         })?;
         let parts = self.triangles().chunks(PART);
         let mut found = vec![Found::NOTHING; parts.len()];
         let vertex_count = self.vertices().len();
-        pool::for_each(0, parts.zip(&mut found).enumerate(), &job, |(part, (triangles, found))| {
+        work::for_each(0, parts.zip(&mut found).enumerate(), &job, |(part, (triangles, found))| {
             check_triangles(triangles, part * PART, vertex_count)?;
             *found = self.look(part * PART..part * PART + triangles.len());
             Ok(())

@@ -1,14 +1,11 @@
 //! Threads. Rayon's are kept from one piece of work to the next: to start one and to fault in what it needs takes 0.1
 //! milliseconds, half of the time that a thousand triangles take to build. Work that is cancelled or fails leaves none.
 
-use std::{
-    num::NonZero,
-    sync::{Mutex, PoisonError},
-};
+use std::{num::NonZero, sync::Mutex};
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-use crate::{Error, Job};
+use crate::Error;
 
 /// How many threads to use; zero asks for all the machine has.
 pub fn thread_count(threads: usize) -> usize {
@@ -108,46 +105,6 @@ fn processors() -> Vec<usize> {
 
 #[cfg(not(target_os = "linux"))]
 fn keep_to(_: usize) {}
-
-/// Hand every item to `work`, on that many threads, in order of their taking; the job may cancel between items.
-///
-/// # Errors
-/// The error of the first item, in their order, that failed among those taken; [`Error::Cancelled`].
-pub fn for_each<I: Send>(
-    threads: usize,
-    items: impl ExactSizeIterator<Item = I> + Send,
-    job: &Job,
-    work: impl Fn(I) -> Result<(), Error> + Sync,
-) -> Result<(), Error> {
-    // Asking how many threads there are takes 30 microseconds, ten times a small batch.
-    let workers = if items.len() > 1 { thread_count(threads).min(items.len()) } else { 1 };
-    let queue = Mutex::new((items.enumerate(), None::<(usize, Error)>));
-    let take = || {
-        let mut queue = queue.lock().unwrap_or_else(PoisonError::into_inner);
-        if queue.1.is_some() { None } else { queue.0.next() }
-    };
-    let fail = |index: usize, error: Error| {
-        let mut queue = queue.lock().unwrap_or_else(PoisonError::into_inner);
-        if queue.1.as_ref().is_none_or(|(first, _)| index < *first) {
-            queue.1 = Some((index, error));
-        }
-    };
-    let worker = || {
-        while let Some((index, item)) = take() {
-            if let Err(error) = job.check().and_then(|()| work(item)) {
-                fail(index, error);
-            }
-        }
-    };
-    std::thread::scope(|scope| {
-        for _ in 1..workers {
-            scope.spawn(worker);
-        }
-        worker();
-    });
-    let (_, error) = queue.into_inner().unwrap_or_else(PoisonError::into_inner);
-    error.map_or(Ok(()), |(_, error)| Err(error))
-}
 
 #[cfg(test)]
 mod tests {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use espalier_core::{Error, HitsMut, Job, Mesh, pool, ray::MISS};
+use espalier_core::{Error, HitsMut, Job, Mesh, ray::MISS, work};
 use numpy::{PyArrayMethods, PyReadwriteArray1};
 use pyo3::{prelude::*, sync::PyOnceLock};
 
@@ -112,7 +112,7 @@ impl Hits {
         let mut normal = arrays::empty_table::<f32>(py, primitive.len(), 3)?;
         let (rows, _) = normal.as_slice_mut()?.as_chunks_mut::<3>();
         let parts = primitive.chunks(PART).zip(rows.chunks_mut(PART));
-        py.detach(|| pool::for_each(self.threads, parts, &Job::new(), |(primitive, rows)| self.fill(primitive, rows)))
+        py.detach(|| work::for_each(self.threads, parts, &Job::new(), |(primitive, rows)| self.fill(primitive, rows)))
             .or_raise(py)?;
         Ok(arrays::finished(normal))
     }

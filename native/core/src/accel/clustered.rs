@@ -2,8 +2,6 @@
 //! the clusters themselves, every division by all that it divides. The cheapest wide nodes are chosen for both together:
 //! where the largest part at the top was opened first instead, trees cost 1.00 to 1.06 times as much.
 
-use rayon::prelude::*;
-
 use super::{
     bins::Bins,
     clusters::Clusters,
@@ -14,7 +12,7 @@ use super::{
     planner::{Set, halve},
     record::Record,
 };
-use crate::{Error, Job, arena::Arena, simd::Level, triangle::LANES};
+use crate::{Error, Job, arena::Arena, simd::Level, triangle::LANES, work};
 
 /// Parts of at most this many triangles are divided by their clusters. With twice as many, trees of small meshes cost as
 /// much, and took up to 1.06 times as long (vianney_house); with half as many the build took as long, and there are more
@@ -35,16 +33,16 @@ pub fn plan(clusters: &Clusters, leaf_size: usize, job: &Job) -> Result<(Top, Ve
     let unit = all.half_area();
     let (mut upper, mut parts) = (Upper::default(), Vec::new());
     divide(all, Level::detect(), job)?.list(&mut upper, &mut parts);
-    let subtrees = parts.into_par_iter().map_init(Divider::default, |divider, cells| {
-        job.check()?;
-        let count = cells.iter().map(|cell| cell.count() as usize).sum();
+    let triangles = |cells: &[Record]| cells.iter().map(|cell| cell.count() as usize).sum();
+    let size = |cells: &&[Record]| triangles(cells);
+    upper.subtrees = work::largest_first(parts.into_iter(), size, job, |divider: &mut Divider, cells| {
+        let count = triangles(cells);
         let parts = cells.iter().map(|cell| clusters.of_cell(cell));
         let subtree = divider.divide(parts, (count, &clusters.triangles), leaf_size, unit)?;
         job.advance(subtree.triangles() as u64);
         Ok(subtree)
-    });
-    upper.subtrees = subtrees.collect::<Result<_, Error>>()?;
-    upper.widened(unit)
+    })?;
+    upper.widened(unit, job)
 }
 
 /// A part of the upper part of a tree.
@@ -131,13 +129,15 @@ impl Weighed for Upper {
 
 impl Upper {
     /// The cheapest wide nodes of all.
-    fn widened(self, unit: f32) -> Result<(Top, Vec<Draft>), Error> {
+    fn widened(self, unit: f32, job: &Job) -> Result<(Top, Vec<Draft>), Error> {
         let collapse = Collapse::of(&self, unit, &mut Costs::default())?;
         let mut widening = Widening { upper: &self, collapse, top: Top::default(), places: Vec::new(), roots: 0 };
         widening.place(0, 1);
         let Widening { top, places, .. } = widening;
-        let drafts = self.subtrees.into_par_iter().zip(places).map(|(subtree, places)| subtree.widened(places));
-        Ok((top, drafts.collect()))
+        let size = |(subtree, _): &(Divided, usize)| subtree.triangles();
+        let subtrees = self.subtrees.into_iter().zip(places);
+        let drafts = work::largest_first(subtrees, size, job, |(), (subtree, places)| Ok(subtree.widened(places)))?;
+        Ok((top, drafts))
     }
 }
 

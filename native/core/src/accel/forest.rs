@@ -2,7 +2,6 @@
 //! What belongs together stands together in the result, which does not depend on the number of threads.
 
 use glam::Vec3A;
-use rayon::prelude::*;
 
 use super::{
     draft::{self, Boxes, Draft, Root, Site},
@@ -15,6 +14,7 @@ use crate::{
     simd::Level,
     traverse::frame::Domain,
     triangle::{Block, LANES},
+    work,
 };
 
 /// Subtrees of at most this many triangles are planned and written by one thread without a look at the job: some
@@ -56,17 +56,14 @@ pub fn write(top: &Top, drafts: &[Draft], mesh: &Mesh, job: &Job) -> Result<Stru
     let mut blocks = Arena::stale(total(|draft| draft.leaves.len()), "the leaves")?;
     let (top_nodes, below) = nodes.split_at_mut(top.nodes.len());
     let sites = sites(drafts, top.nodes.len(), below, &mut blocks);
-    let subtrees: Result<Vec<Vec<Written>>, Error> = sites
-        .into_par_iter()
-        .zip(drafts)
-        .map_init(Boxes::default, |boxes, (site, draft)| {
-            job.check()?;
+    let size = |(_, draft): &(Site<'_>, &Draft)| draft.triangles;
+    let subtrees =
+        work::largest_first(sites.into_iter().zip(drafts), size, job, |boxes: &mut Boxes, (site, draft)| {
             let written = write_subtree(site, draft, mesh, domain.centre.into(), boxes);
             job.advance(draft.triangles as u64);
             Ok(written)
-        })
-        .collect();
-    let root = write_top(top, &subtrees?.concat(), top_nodes, domain.centre.into());
+        })?;
+    let root = write_top(top, &subtrees.concat(), top_nodes, domain.centre.into());
     let (root, stack_size) = root.map_or((NodeRef::EMPTY, 0), |root| (root.root, root.stack_size));
     Ok(Structure { nodes, blocks, stack_size, ..Structure::of(root, domain) })
 }

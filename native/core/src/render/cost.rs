@@ -9,13 +9,13 @@ use super::{
     path::{Context, primary_rays},
     queue::RayQueue,
 };
-use crate::{Error, error, pool, traverse::probe::Counts};
+use crate::{Error, error, traverse::probe::Counts, work};
 
 /// Steps of every pixel, mean per sample.
 pub fn steps(context: &Context<'_>) -> Result<Vec<f32>, Error> {
     let window = context.camera.window();
     let picture = Mutex::new(error::filled(window.count(), 0.0, "the cost of the picture")?);
-    pool::for_each(context.settings.threads, window.tiles(TILE).into_iter(), context.job, |tile| {
+    work::for_each(context.settings.threads, window.tiles(TILE).into_iter(), context.job, |tile| {
         let sums = tile_steps(context, tile)?;
         let mut picture = lock(&picture);
         for (index, sum) in sums.into_iter().enumerate() {

@@ -32,7 +32,7 @@ use self::{
     film::{TILE, Tile},
     path::{Context, Wavefront},
 };
-use crate::{Accelerator, Error, Job, job::Phase, pool};
+use crate::{Accelerator, Error, Job, job::Phase, pool, work};
 
 /// How a picture is to be made.
 #[derive(Debug, Clone, PartialEq)]
@@ -115,7 +115,7 @@ fn picture(context: &Context<'_>) -> Result<(Film, Counters), Error> {
     let window = context.camera.window();
     let film = Film::new(context.camera.size())?;
     let shared = Mutex::new(Shared { film, counters: Counters::default(), spare: Vec::new() });
-    pool::for_each(context.settings.threads, window.tiles(TILE).into_iter(), context.job, |pixels| {
+    work::for_each(context.settings.threads, window.tiles(TILE).into_iter(), context.job, |pixels| {
         let (mut wavefront, mut tile) = lock(&shared).spare.pop().unwrap_or_default();
         tile.reset(pixels);
         for sample in 0..context.settings.samples {

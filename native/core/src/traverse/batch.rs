@@ -18,9 +18,10 @@ use crate::{
     Error, Job, Mesh,
     accel::structure::Structure,
     job::Phase,
-    pool::{self, thread_count},
+    pool::thread_count,
     ray::{Hit, HitsMut, Rays},
     simd::{Kernel, Level, Simd},
+    work,
 };
 
 /// A structure, the mesh it stands for, and the instruction set to use.
@@ -234,7 +235,7 @@ fn parallel<O: Send>(
     work: impl Fn(Rays<'_>, O) -> Result<(), Error> + Sync,
 ) -> Result<(), Error> {
     job.begin(Phase::Trace, rays.len() as u64);
-    pool::for_each(threads, parts.enumerate(), job, |(number, part)| {
+    work::for_each(threads, parts.enumerate(), job, |(number, part)| {
         let rays = rays.part(number * size, size);
         let count = rays.len() as u64;
         work(rays, part)?;
