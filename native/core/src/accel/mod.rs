@@ -43,6 +43,7 @@ pub mod pack;
 pub mod places;
 pub mod planner;
 pub mod ploc;
+pub mod radix;
 pub mod record;
 pub mod reinsert;
 pub mod sah;

@@ -1,12 +1,13 @@
-//! Triangles in the order of a Morton curve through the middles of their boxes: a parallel radix sort, least
-//! significant digit first, whose result does not depend on the number of threads.
-
-use std::slice::IterMut;
+//! Triangles in the order of a Morton curve through the middles of their boxes.
 
 use glam::Vec3A;
 use rayon::prelude::*;
 
-use super::{ahead, record::UnitCube};
+use super::{
+    ahead,
+    radix::{self, BUCKETS, Counts, DIGIT, STEP, Splitters},
+    record::UnitCube,
+};
 use crate::{
     Error, Job, Mesh,
     arena::Arena,
@@ -39,24 +40,18 @@ impl Key {
         self.0 >> Self::TRIANGLE
     }
 
+    /// One of the three digits of its code, the least significant first.
     #[inline(always)]
-    fn digit(self, pass: u32) -> usize {
+    pub fn digit(self, pass: u32) -> usize {
         (self.0 >> (Self::TRIANGLE + pass * DIGIT)) as usize & (BUCKETS - 1)
     }
 }
 
-/// Bits of a coordinate, and of a digit: three coordinates are sorted in three passes. More buckets than a thousand leave
-/// the cache nearest to the processor.
-const DIGIT: u32 = 10;
-const BUCKETS: usize = 1 << DIGIT;
-
-/// Most keys that a thread goes through between two looks at the job: some milliseconds.
-const STEP: usize = 1 << 20;
-
 /// Fewest keys that are worth a thread of their own.
 const PART: usize = 1 << 14;
 
-type Histogram = [u32; BUCKETS];
+/// Keys per part by which is found out where the parts of a sort are to end.
+const SAMPLES: usize = 1 << 7;
 
 /// The keys of all solid triangles, sorted.
 ///
@@ -65,24 +60,36 @@ type Histogram = [u32; BUCKETS];
 pub fn sorted(mesh: &Mesh, job: &Job) -> Result<Arena<Key>, Error> {
     const WHAT: &str = "the order of triangles";
     let count = mesh.solid_count();
-    let (mut keys, mut other) = (Arena::stale(count, WHAT)?, Arena::stale(count, WHAT)?);
-    let part = count.div_ceil(rayon::current_num_threads()).clamp(PART, STEP);
-    let mut histograms: Vec<[Histogram; 3]> = error::filled(count.div_ceil(part), [[0; BUCKETS]; 3], WHAT)?;
+    let (mut keys, spare) = (Arena::stale(count, WHAT)?, Arena::stale(count, WHAT)?);
+    let parts = rayon::current_num_threads().min(count / PART).max(1);
     let (cube, level) = (UnitCube::new(&mesh.bounds()), Level::detect());
-    let parts = keys.par_chunks_mut(part).zip(&mut histograms).enumerate();
-    parts.try_for_each(|(index, (keys, histograms))| {
-        job.check()?;
-        level.run(Encode { mesh, cube: &cube, first: index * part, keys, histograms });
+    let splitters = splitters(mesh, &cube, parts);
+    let chunk = count.div_ceil(parts).max(1);
+    let mut counts: Vec<Vec<Counts>> = error::reserve(parts, WHAT)?;
+    for _ in keys.chunks(chunk) {
+        counts.push(error::filled(parts, Counts::NONE, WHAT)?);
+    }
+    keys.par_chunks_mut(chunk).zip(&mut counts).enumerate().try_for_each(|(index, (keys, counts))| {
+        for (step, keys) in keys.chunks_mut(STEP).enumerate() {
+            job.check()?;
+            let first = index * chunk + step * STEP;
+            level.run(Encode { mesh, cube: &cube, first, keys, splitters: &splitters, counts });
+        }
         Ok(())
     })?;
-    for pass in 0..3 {
-        if pass > 0 && histograms.len() > 1 {
-            recount(&keys, part, pass, &mut histograms);
-        }
-        scatter(&keys, &mut other, part, pass, &histograms, job)?;
-        std::mem::swap(&mut keys, &mut other);
-    }
-    Ok(keys)
+    radix::sort(keys, spare, &splitters, &counts, job)
+}
+
+/// Keys that divide all into so many parts of about the same size, as far as a few triangles tell.
+fn splitters(mesh: &Mesh, cube: &UnitCube, parts: usize) -> Splitters {
+    let (reader, samples) = (mesh.reader(), SAMPLES * parts);
+    let sample = |index| {
+        let triangle = mesh.solid(mesh.solid_count() * index / samples).next()?;
+        Some(key(reader.corners(triangle), cube, triangle))
+    };
+    let mut keys: Vec<Key> = if parts > 1 { (0..samples).filter_map(sample).collect() } else { Vec::new() };
+    keys.sort_unstable();
+    Splitters(keys.chunks(SAMPLES).skip(1).map(|part| part[0]).collect())
 }
 
 /// A number below 2^22 plus this has its integer in the low bits, and needs no instruction to convert it.
@@ -98,13 +105,14 @@ pub fn key(corners: [Vec3A; 3], cube: &UnitCube, triangle: u32) -> Key {
     Key::new(u64::from(x << 2 | y << 1 | z), triangle)
 }
 
-/// Makes the keys of solid triangles from the one with the number `first` on, and counts their digits.
+/// Makes the keys of solid triangles from the one with the number `first` on, and counts their digits by their part.
 struct Encode<'a> {
     mesh: &'a Mesh,
     cube: &'a UnitCube,
     first: usize,
     keys: &'a mut [Key],
-    histograms: &'a mut [Histogram; 3],
+    splitters: &'a Splitters,
+    counts: &'a mut [Counts],
 }
 
 impl Kernel for Encode<'_> {
@@ -112,15 +120,13 @@ impl Kernel for Encode<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) {
-        let Self { mesh, cube, first, keys, histograms } = self;
+        let Self { mesh, cube, first, keys, splitters, counts } = self;
         let reader = mesh.reader();
         for (to, triangle) in keys.iter_mut().zip(mesh.solid(first)) {
             ahead::ask(simd, reader, triangle as usize, |place| u32::try_from(place).ok());
             let key = key(reader.corners(triangle), cube, triangle);
             *to = key;
-            for (pass, histogram) in histograms.iter_mut().enumerate() {
-                histogram[key.digit(pass as u32)] += 1;
-            }
+            counts[splitters.part(key)].add(key);
         }
     }
 }
@@ -140,66 +146,6 @@ static SPREAD: [u32; BUCKETS] = {
     spread
 };
 
-/// What each part has of each digit, after its keys have changed.
-fn recount(keys: &[Key], part: usize, pass: u32, histograms: &mut [[Histogram; 3]]) {
-    keys.par_chunks(part).zip(histograms).for_each(|(keys, histograms)| {
-        let histogram = &mut histograms[pass as usize];
-        histogram.fill(0);
-        keys.iter().for_each(|key| histogram[key.digit(pass)] += 1);
-    });
-}
-
-/// Sort by one digit; keys of equal digits stay in order.
-fn scatter(
-    from: &[Key],
-    to: &mut [Key],
-    part: usize,
-    pass: u32,
-    histograms: &[[Histogram; 3]],
-    job: &Job,
-) -> Result<(), Error> {
-    if let [histograms] = histograms {
-        job.check()?;
-        scatter_alone(from, to, pass, &histograms[pass as usize]);
-        return Ok(());
-    }
-    let mut buckets: Vec<Vec<IterMut<'_, Key>>> = Vec::new();
-    for _ in histograms {
-        buckets.push(error::reserve(BUCKETS, "sorting")?);
-    }
-    let mut rest = to;
-    for digit in 0..BUCKETS {
-        for (buckets, histograms) in buckets.iter_mut().zip(histograms) {
-            let (bucket, behind) = rest.split_at_mut(histograms[pass as usize][digit] as usize);
-            buckets.push(bucket.iter_mut());
-            rest = behind;
-        }
-    }
-    from.par_chunks(part).zip(buckets).try_for_each(|(keys, mut buckets)| {
-        job.check()?;
-        for key in keys {
-            if let Some(place) = buckets[key.digit(pass)].next() {
-                *place = *key;
-            }
-        }
-        Ok(())
-    })
-}
-
-/// The same by one thread, which needs to remember less of where it is.
-fn scatter_alone(from: &[Key], to: &mut [Key], pass: u32, histogram: &Histogram) {
-    let mut place = 0;
-    let mut places = histogram.map(|count| {
-        place += count;
-        place - count
-    });
-    for key in from {
-        let place = &mut places[key.digit(pass)];
-        to[*place as usize] = *key;
-        *place += 1;
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use glam::Vec3;
@@ -207,17 +153,35 @@ mod tests {
     use super::*;
     use crate::pool;
 
+    /// Triangles at places that come in no order, or all at one.
+    fn mesh(count: u32, place: impl Fn(u32) -> Vec3) -> Mesh {
+        let vertices = (0..count).flat_map(|i| [place(i), place(i) + Vec3::X, place(i) + Vec3::Y]).collect();
+        Mesh::new(vertices, (0..count).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect()).unwrap()
+    }
+
     #[test]
     fn keys_are_sorted_whatever_the_number_of_threads() {
+        let scattered = |i: u32| Vec3::new((i * 37 % 101) as f32, (i * 53 % 97) as f32, (i * 71 % 89) as f32);
         let count = 5 * PART as u32 + 7;
-        let place = |i: u32| Vec3::new((i * 37 % 101) as f32, (i * 53 % 97) as f32, (i * 71 % 89) as f32);
-        let vertices = (0..count).flat_map(|i| [place(i), place(i) + Vec3::X, place(i) + Vec3::Y]).collect();
-        let mesh = Mesh::new(vertices, (0..count).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect()).unwrap();
-        let [one, three] = [1, 3].map(|threads| pool::install(threads, || sorted(&mesh, &Job::new())).unwrap());
-        assert!(one.is_sorted() && one[..] == three[..]);
-        let mut triangles: Vec<u32> = one.iter().map(|key| key.triangle()).collect();
-        triangles.sort_unstable();
-        assert!(triangles.into_iter().eq(0..count));
+        let lonely = |i: u32| if i == 9 { Vec3::splat(1e6) } else { scattered(i) };
+        for mesh in [mesh(count, scattered), mesh(count, lonely), mesh(count, |_| Vec3::ONE), mesh(3, scattered)] {
+            let [one, two, three] =
+                [1, 2, 3].map(|threads| pool::install(threads, || sorted(&mesh, &Job::new())).unwrap());
+            assert!(one.is_sorted() && one[..] == two[..] && one[..] == three[..]);
+            let mut triangles: Vec<u32> = one.iter().map(|key| key.triangle()).collect();
+            triangles.sort_unstable();
+            assert!(triangles.into_iter().eq(0..mesh.triangles().len() as u32));
+        }
+    }
+
+    #[test]
+    fn parts_of_a_sort_are_about_as_large() {
+        let count = 4 * PART as u32;
+        let mesh = mesh(count, |i| Vec3::new((i % 256) as f32, (i / 256 * 7 % 256) as f32, 0.0));
+        let splitters = splitters(&mesh, &UnitCube::new(&mesh.bounds()), 4);
+        let mut counts = [0; 4];
+        sorted(&mesh, &Job::new()).unwrap().iter().for_each(|&key| counts[splitters.part(key)] += 1);
+        assert!(counts.iter().all(|part| (PART * 4 / 5..PART * 5 / 4).contains(part)), "{counts:?}");
     }
 
     #[test]
