@@ -64,12 +64,25 @@ impl Draft {
     /// Add a leaf of one to eight triangles.
     #[inline(always)]
     pub fn push_leaf(&mut self, triangles: impl Iterator<Item = u32>) -> NodeRef {
-        let (mut leaf, mut count) = ([MISS; LANES], 0);
+        let (leaf, mut count) = (self.leaf(), 0);
         for triangle in triangles {
             leaf[count] = triangle;
             count += 1;
         }
-        self.leaves.push(leaf);
+        self.filled(count)
+    }
+
+    /// A new leaf without triangles, to be filled where it is: one that was filled elsewhere number by number would be
+    /// copied by vectors, which wait for all numbers.
+    #[inline(always)]
+    pub fn leaf(&mut self) -> &mut [u32; LANES] {
+        self.leaves.push([MISS; LANES]);
+        self.leaves.last_mut().expect("there is the one just added")
+    }
+
+    /// The new leaf with so many triangles.
+    #[inline(always)]
+    pub fn filled(&mut self, count: usize) -> NodeRef {
         self.triangles += count;
         NodeRef::leaf(self.leaves.len() - 1, count)
     }
@@ -170,10 +183,12 @@ impl Kernel for Leaves<'_> {
     fn run<S: Simd>(self, simd: S) {
         let Self { leaves, mesh, blocks, boxes } = self;
         let (all, reader) = (leaves.as_flattened(), mesh.reader());
+        // Where no triangle is, the last one is asked for: nobody can guess how many are in a leaf.
+        let last = mesh.triangles().len().max(1) as u32 - 1;
         boxes.clear();
         for (index, (leaf, block)) in leaves.iter().zip(blocks).enumerate() {
             for lane in 0..LANES {
-                ahead::ask(simd, reader, index * LANES + lane, |place| all.get(place).copied());
+                ahead::ask(simd, reader, index * LANES + lane, |place| all.get(place).map(|&t| t.min(last)));
             }
             boxes.push(fill(simd, leaf, reader, block));
         }

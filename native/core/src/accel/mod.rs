@@ -15,6 +15,7 @@ pub mod clusters;
 pub mod collapse;
 pub mod config;
 pub mod content;
+pub mod curve;
 pub mod decision;
 pub mod divided;
 pub mod draft;

@@ -24,7 +24,9 @@ impl Key {
     /// Bits of a triangle's number; [`Mesh`] allows no more.
     const TRIANGLE: u32 = 27;
 
-    fn new(code: u64, triangle: u32) -> Self {
+    /// Of a triangle.
+    #[inline(always)]
+    pub fn new(code: u64, triangle: u32) -> Self {
         Self(code << Self::TRIANGLE | u64::from(triangle))
     }
 

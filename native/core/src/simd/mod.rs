@@ -165,7 +165,7 @@ pub trait Simd: Arithmetic {
 /// The number, read on its own. Compilers join reads of neighbours to one of a vector; that has to wait until all
 /// numbers have arrived in the cache where they were written one by one just before, some fifteen cycles.
 #[inline(always)]
-pub fn read_alone(number: &f32) -> f32 {
+pub fn read_alone<T: Copy>(number: &T) -> T {
     // SAFETY: the reference is to a number that can be read.
     unsafe { std::ptr::from_ref(number).read_volatile() }
 }
