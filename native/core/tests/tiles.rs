@@ -4,7 +4,7 @@
 mod common;
 
 use common::*;
-use espalier_core::Mesh;
+use espalier_core::{Mesh, ray::Ray};
 use glam::Vec3;
 use std::sync::Arc;
 
@@ -12,6 +12,7 @@ every_walk!([
     soups_from_outside_and_inside,
     in_blocks_of_any_side,
     where_squares_break_off,
+    of_rays_far_apart,
     at_corners_and_edges,
     from_corners_and_planes,
     intervals_that_end_anywhere,
@@ -61,6 +62,17 @@ fn in_blocks_of_any_side(walk: &Walk) {
     for side in [1, 2, 4, 8, 16, 32, 64] {
         walk.agrees(&mesh, &in_blocks(Vec3::new(0.4, 0.6, -1.5), Vec3::new(0.05, -0.02, 1.0), 0.4, 64, side));
     }
+}
+
+/// So few rays see so much that their tiles are given up.
+fn of_rays_far_apart(walk: &Walk) {
+    let mesh = mesh(soup(12_000, 0.02), |v| v);
+    let mut rays = image(Vec3::new(0.5, 0.5, -0.6), Vec3::Z, 0.8, 16);
+    for index in 0..256 {
+        let Ray { origin, direction, tmin, tmax } = rays.ray(index);
+        rays.push(origin, direction, tmin, tmax);
+    }
+    walk.agrees(&mesh, &rays);
 }
 
 /// One ray among many starts elsewhere, goes back, or is slanted.

@@ -19,6 +19,8 @@ pub struct Terms {
     stream: usize,
     /// Nanoseconds a ray below which tiles are not compared.
     cheap: f64,
+    /// Nanoseconds a ray that are expected of a stream where none was compared.
+    unknown: f64,
     /// A tile that takes so many times what a stream is expected to take ends the term: a verdict on the sky is none on
     /// everything else.
     slow: f64,
@@ -32,22 +34,26 @@ pub struct Terms {
 /// it: so both are measured over as many rays, and streams do not serve long. Against verdicts by the faster of two
 /// tiles, as for few rays, on a Xeon with AVX-512: the room in 1/1.3 to 1/1.6 of the time, reciprocating_saw 1/1.4, dragon
 /// 1/1.2, Sponza 1/1.1, bunny2 and Sibenik equal, stadium and hair_straight 1.07 times. Tiles alone: hair 1.5 times.
-const TILES: Terms = Terms { tiles: 4, stream: STREAM, cheap: UNKNOWN, slow: 4.0, term: 1 << 15, retry: 4 * STREAM };
+const TILES: Terms =
+    Terms { tiles: 4, stream: STREAM, cheap: 150.0, unknown: 150.0, slow: 4.0, term: 1 << 15, retry: 4 * STREAM };
 
-/// The rays of a small picture. Its tiles cover more, may take 2.4 microseconds a ray, and are soon all traced: by the
-/// terms above ten thousand rays took up to twice as long.
-const FEW_TILES: Terms = Terms { tiles: 2, stream: STREAM, cheap: 30.0, slow: 2.0, term: 1 << 15, retry: 1 << 15 };
+/// The rays of a small picture. Its tiles cover more, may be slower than streams by ten times, and are soon all traced, so
+/// few of them are to be tried, and what begins in the sky is not to be trusted. By the terms above, pictures of 65 to 260
+/// thousand rays line by line took 1.25 to 1.5 times as long in the mean over 17 scenes, up to 4 times
+/// (reciprocating_saw). With 40 nanoseconds expected instead, blocks of 8 by 8 in Sponza took 1.3 times as long; with 60,
+/// ten thousand rays 1.1 times.
+const FEW_TILES: Terms =
+    Terms { tiles: 2, stream: STREAM, cheap: 30.0, unknown: 50.0, slow: 2.0, term: 1 << 15, retry: 4 * STREAM };
 
-/// Pictures of fewer rays are small.
-const FEW: usize = 1 << 16;
+/// Pictures of fewer rays are small. Where all are taken to be, a million rays in blocks took 1.3 times as long in the room
+/// and in Sponza, and 1/1.3 in hair_straight.
+const FEW: usize = 1 << 18;
 
 /// Where any hit will do: packets and streams differ by less than half, and a stream must be long to show what it can. To
 /// gather and sort its rays takes as long as the cheapest packets, which are not compared: they see large triangles, and
 /// ambient occlusion there (hospital, vianney, room) takes 1/1.05 to 1/1.09 of the time.
-const PACKETS: Terms = Terms { tiles: 2, stream: 8 * STREAM, cheap: 20.0, slow: 4.0, term: 1 << 17, retry: 1 << 17 };
-
-/// Nanoseconds a ray that are expected of a stream where none was compared.
-const UNKNOWN: f64 = 150.0;
+const PACKETS: Terms =
+    Terms { tiles: 2, stream: 8 * STREAM, cheap: 20.0, unknown: 150.0, slow: 4.0, term: 1 << 17, retry: 1 << 17 };
 
 /// What one query, on all its threads, has learned of its rays.
 #[derive(Debug)]
@@ -207,6 +213,13 @@ impl<'p> Trial<'p> {
         }
     }
 
+    /// A tile made too many visits and was given up: whatever its rays take otherwise, it is a verdict for streams.
+    #[inline]
+    pub fn gave_up(&mut self) {
+        self.watch = None;
+        self.stage = Stage::Tiles { count: 1, nanoseconds: f64::INFINITY };
+    }
+
     /// Rays were taken, by a tile or a bin; true where all bins are to be traced now.
     #[inline]
     pub fn took(&mut self, count: usize) -> bool {
@@ -217,13 +230,15 @@ impl<'p> Trial<'p> {
                 false
             }
             // A small picture has no time to measure more of what is as slow as that.
-            Stage::Tiles { count, nanoseconds } if *count == terms.tiles || *nanoseconds > terms.slow * UNKNOWN => {
+            Stage::Tiles { count, nanoseconds }
+                if *count == terms.tiles || *nanoseconds > terms.slow * terms.unknown =>
+            {
                 let tiles = *nanoseconds / f64::from(*count);
                 if tiles > terms.cheap {
                     self.stage = Stage::Stream { tiles, start: Instant::now(), rays: 0 };
                     return true;
                 }
-                self.decide(tiles, UNKNOWN);
+                self.decide(tiles, terms.unknown);
                 false
             }
             Stage::Tiles { .. } => false,
@@ -287,7 +302,7 @@ mod tests {
     #[test]
     fn one_slow_tile_ends_the_term_of_those_before() {
         let pace = Pace::new(&TILES);
-        pace.decide(20.0, UNKNOWN);
+        pace.decide(20.0, TILES.unknown);
         let mut trial = Trial::new(&pace);
         trace_tile(&mut trial, Instant::now(), 1 << 40);
         assert!(!trial.took(8));
@@ -317,6 +332,21 @@ mod tests {
         trial.emptied();
         assert_eq!(pace.turn(), Turn::Stream);
         assert!(!trial.wants_tiles(true));
+    }
+
+    #[test]
+    fn a_tile_that_was_given_up_is_compared_with_a_stream() {
+        let pace = Pace::new(&TILES);
+        pace.decide(20.0, 50.0);
+        let mut trial = Trial::new(&pace);
+        assert!(trial.wants_tiles(true));
+        trial.begin_tile();
+        trial.gave_up();
+        assert!(trial.took(8));
+        trial.emptied();
+        assert!(!trial.wants_tiles(true) && trial.took(TILES.stream));
+        trial.emptied();
+        assert_eq!((pace.turn(), pace.rays_left.load(Relaxed)), (Turn::Stream, TILES.term as u32));
     }
 
     #[test]

@@ -184,7 +184,11 @@ impl<'a, T: Take + ?Sized, const ANY: bool> Together<'a, T, ANY> {
             self.ripe = first + UNRIPE;
             return 0;
         }
-        let count = tile::trace::<S, GRIDS>(simd, structure, mesh, tile, visits, stack);
+        let Some(count) = tile::trace::<S, GRIDS>(simd, structure, mesh, tile, visits, stack) else {
+            self.trial.gave_up();
+            self.ripe = first + taken;
+            return 0;
+        };
         for eight in (0..taken).step_by(LANES) {
             let mut hits = Eight::MISSES;
             tile.hits(simd, mesh, eight, &mut hits);
