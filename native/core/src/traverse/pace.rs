@@ -31,9 +31,9 @@ pub struct Terms {
 }
 
 /// Camera rays. They see the sky here and a scan there, and tiles may take a tenth of the time of streams or three times
-/// it: so both are measured over as many rays, and streams do not serve long. Against verdicts by the faster of two
-/// tiles, as for few rays, on a Xeon with AVX-512: the room in 1/1.3 to 1/1.6 of the time, reciprocating_saw 1/1.4, dragon
-/// 1/1.2, Sponza 1/1.1, bunny2 and Sibenik equal, stadium and hair_straight 1.07 times. Tiles alone: hair 1.5 times.
+/// it: so both are measured over as many rays, and streams do not serve long. Against verdicts by the faster of two tiles
+/// on a Xeon with AVX-512: the room in 1/1.3 to 1/1.6 of the time, reciprocating_saw 1/1.4, dragon 1/1.2, Sponza 1/1.1,
+/// bunny2 and Sibenik equal, stadium and hair_straight 1.07 times. Tiles alone: hair 1.5 times.
 const TILES: Terms =
     Terms { tiles: 4, stream: STREAM, cheap: 150.0, unknown: 150.0, slow: 4.0, term: 1 << 15, retry: 4 * STREAM };
 

@@ -93,8 +93,8 @@ pub struct Visit {
     high: [f32; 2],
 }
 
-/// Most visits of a tile, eight a ray: one whose rays keep together makes some dozens, one that covers much of a scene may
-/// make ten thousand, and streams trace its rays in a tenth of the time.
+/// Most visits of a tile, eight a ray of a full one: a tile whose rays keep together makes some dozens, one that covers
+/// much of a scene may make ten thousand, and streams trace its rays in a tenth of the time.
 const MOST_VISITS: usize = 8 * GROUPS * RAYS;
 
 /// Find the closest hits of a tile's rays; returns the number of visits, of which those of rays that go on one by one are
