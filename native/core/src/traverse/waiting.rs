@@ -55,7 +55,7 @@ pub struct Waiting {
 impl Waiting {
     /// Forget all rays; there is room then for as many as wait at once in a batch of that size.
     pub fn begin(&mut self, batch: usize) {
-        let room = (batch + SPARE).min(most());
+        let room = batch.min(most()) + SPARE;
         if self.rows.len() < room {
             self.rows.resize(room, [0.0; 8]);
             self.keys.resize(room, 0);
