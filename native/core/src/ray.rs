@@ -1,10 +1,11 @@
 //! Batches of rays and hits in structure-of-arrays form.
 
+use bytemuck::Pod;
 use glam::Vec3;
 
 use crate::{
     Error,
-    simd::{Arithmetic, Simd, read_alone},
+    simd::{Aligned, Arithmetic, Simd, read_alone},
     traverse::frame::{Domain, Frame},
     triangle::LANES,
 };
@@ -318,6 +319,18 @@ impl<'a> HitsMut<'a> {
         self.v[index..index + LANES].copy_from_slice(&hits.v);
     }
 
+    /// The hits of `count` rays from `index` on, to be written by [`Simd::stream`]; nothing where the columns do not begin as
+    /// it asks for.
+    #[inline(always)]
+    pub(crate) fn aligned(&mut self, index: usize, count: usize) -> Option<AlignedHits<'_>> {
+        Some(AlignedHits {
+            t: aligned(&mut self.t[index..index + count])?,
+            primitive: aligned(&mut self.primitive[index..index + count])?,
+            u: aligned(&mut self.u[index..index + count])?,
+            v: aligned(&mut self.v[index..index + count])?,
+        })
+    }
+
     /// Write one hit.
     #[inline(always)]
     pub fn set(&mut self, index: usize, hit: Hit) {
@@ -326,6 +339,31 @@ impl<'a> HitsMut<'a> {
         self.u[index] = hit.u;
         self.v[index] = hit.v;
     }
+}
+
+/// Where hits are written that nobody reads soon, eight by eight.
+pub(crate) struct AlignedHits<'a> {
+    t: &'a mut [[Aligned; 2]],
+    primitive: &'a mut [[Aligned; 2]],
+    u: &'a mut [[Aligned; 2]],
+    v: &'a mut [[Aligned; 2]],
+}
+
+impl AlignedHits<'_> {
+    /// Write the hits of rays `index` to `index + 7` by [`Simd::stream`].
+    #[inline(always)]
+    pub fn set_eight<S: Simd>(&mut self, simd: S, index: usize, hits: &Eight) {
+        let eight = index / LANES;
+        simd.stream(&hits.t, &mut self.t[eight]);
+        simd.stream(bytemuck::cast_ref(&hits.primitive), &mut self.primitive[eight]);
+        simd.stream(&hits.u, &mut self.u[eight]);
+        simd.stream(&hits.v, &mut self.v[eight]);
+    }
+}
+
+#[inline(always)]
+fn aligned<T: Pod>(column: &mut [T]) -> Option<&mut [[Aligned; 2]]> {
+    bytemuck::try_cast_slice_mut(column).ok()
 }
 
 /// Eight hits by column.

@@ -4,7 +4,11 @@
 mod common;
 
 use common::*;
-use espalier_core::{Mesh, ray::Ray};
+use espalier_core::{
+    Accelerator, Config, Job, Mesh, Method,
+    ray::{Hits, HitsMut, Ray},
+    simd::Level,
+};
 use glam::Vec3;
 use std::sync::Arc;
 
@@ -91,6 +95,33 @@ fn where_squares_break_off(walk: &Walk) {
             rays.push(origin, direction, 0.0, f32::INFINITY);
         }
         walk.agrees(&mesh, &rays);
+    }
+}
+
+/// Hits that fill the caches are written past them, where their columns begin as that asks for.
+#[test]
+fn of_large_pictures() {
+    let mesh = mesh(soup(300, 0.3), |v| v);
+    let rays = image(Vec3::new(0.4, 0.6, -1.5), Vec3::Z, 0.4, 512);
+    for level in Level::available() {
+        let built = Accelerator::build(mesh.clone(), Method::BvhSah, &Config::default(), 2, &Job::new()).unwrap();
+        let accelerator = built.with_level(level);
+        let (part, mut expected) = (1 << 14, Vec::new());
+        for first in (0..rays.len()).step_by(part) {
+            let mut hits = Hits::misses(part);
+            accelerator.closest(&rays.rays().part(first, part), hits.as_mut(), 1, &Job::new()).unwrap();
+            expected.extend((0..part).map(|index| hits.get(index)));
+        }
+        for offset in 0..5 {
+            let mut room = Hits::misses(rays.len() + offset);
+            let HitsMut { t, primitive, u, v } = room.as_mut();
+            let (t, primitive) = (&mut t[offset..], &mut primitive[offset..]);
+            let hits = HitsMut { t, primitive, u: &mut u[offset..], v: &mut v[offset..] };
+            accelerator.closest(&rays.rays(), hits, 2, &Job::new()).unwrap();
+            for (index, &hit) in expected.iter().enumerate() {
+                assert_eq!(room.get(offset + index), hit, "ray {index}, {offset} numbers aside, {}", level.name());
+            }
+        }
     }
 }
 

@@ -24,6 +24,8 @@ pub use twice::Twice;
 #[cfg(target_arch = "x86_64")]
 pub use x86::{Avx2, Avx512};
 
+use bytemuck::{Pod, Zeroable};
+
 /// Arithmetic on vectors of some number of lanes, which are numbered from 0.
 ///
 /// `min` and `max` return their second argument where either is not a number, as x86 does; kernels rely on that.
@@ -156,11 +158,25 @@ pub trait Simd: Arithmetic {
     }
     /// Ask for a value that is to be read soon; may do nothing.
     fn prefetch<T>(self, value: &T);
+    /// Write numbers that nobody reads soon: past the caches, where that is possible, so that they need not be read before and
+    /// push nothing out. [`Simd::fence`] must follow before anybody looks at them.
+    #[inline(always)]
+    fn stream(self, from: &[f32; 8], to: &mut [Aligned; 2]) {
+        *to = bytemuck::cast(*from);
+    }
+    /// Wait for what was written by [`Simd::stream`].
+    #[inline(always)]
+    fn fence(self) {}
     /// Copy the ids whose mask has bit `bit` to the front of `out`, in order, and count them.
     ///
     /// All slices have the same length, a multiple of [`Simd::GROUP`]; what stands in `out` behind the copies is unspecified.
     fn compact(self, masks: &[u8], bit: u32, ids: &[u16], out: &mut [u16]) -> usize;
 }
+
+/// Four numbers that begin at a multiple of sixteen bytes.
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C, align(16))]
+pub struct Aligned([f32; 4]);
 
 /// The number, read on its own. Compilers join reads of neighbours to one of a vector; that has to wait until all
 /// numbers have arrived in the cache where they were written one by one just before, some fifteen cycles.

@@ -67,6 +67,7 @@ pub struct Pace {
     rays_left: AtomicU32,
     /// Nanoseconds a ray that are expected of a stream.
     stream: AtomicU32,
+    is_large: bool,
 }
 
 /// Who is to take the next rays.
@@ -83,7 +84,15 @@ enum Turn {
 impl Pace {
     /// For so many rays of which the closest hits are wanted.
     pub fn closest(rays: usize) -> Self {
-        Self::new(if rays < FEW { &FEW_TILES } else { &TILES })
+        let is_large = rays >= FEW;
+        Self { is_large, ..Self::new(if is_large { &TILES } else { &FEW_TILES }) }
+    }
+
+    /// Whether the closest hits of so many rays are wanted that they fill the caches, four megabytes: those of tiles are
+    /// then written past them. So a million camera rays take 1/1.03 to 1/1.1 of the time where they see large triangles,
+    /// and as long where they see scans (Zen 5).
+    pub fn is_large(&self) -> bool {
+        self.is_large
     }
 
     /// For so many rays of which any hit is wanted. For few of them packets and streams are not compared: it takes some
@@ -98,8 +107,8 @@ impl Pace {
     }
 
     fn new(terms: &'static Terms) -> Self {
-        let (streams_are_faster, rays_left, stream) = Default::default();
-        Self { terms, streams_are_faster, rays_left, stream }
+        let (streams_are_faster, rays_left, stream, is_large) = Default::default();
+        Self { terms, streams_are_faster, rays_left, stream, is_large }
     }
 
     /// Who is to take the next rays.

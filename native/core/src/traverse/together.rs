@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     Error,
-    ray::{Eight, Hit, HitsMut, MISS, Rays},
+    ray::{AlignedHits, Eight, Hit, HitsMut, MISS, Rays},
     simd::{Kernel, Simd},
     triangle::LANES,
 };
@@ -23,6 +23,11 @@ pub trait Take {
     fn take(&mut self, index: usize, hit: Hit);
     /// The hits of rays `index` to `index + 7`.
     fn take_eight(&mut self, index: usize, hits: &Eight);
+    /// Where the hits of `count` rays from `index` on can be written past the caches, if they can; [`Simd::fence`] must
+    /// follow.
+    fn aligned(&mut self, _index: usize, _count: usize) -> Option<AlignedHits<'_>> {
+        None
+    }
 }
 
 impl Take for HitsMut<'_> {
@@ -33,6 +38,10 @@ impl Take for HitsMut<'_> {
     #[inline(always)]
     fn take_eight(&mut self, index: usize, hits: &Eight) {
         self.set_eight(index, hits);
+    }
+    #[inline(always)]
+    fn aligned(&mut self, index: usize, count: usize) -> Option<AlignedHits<'_>> {
+        HitsMut::aligned(self, index, count)
     }
 }
 
@@ -94,6 +103,8 @@ pub struct Together<'a, T: ?Sized, const ANY: bool> {
     trial: Trial<'a>,
     /// Before this ray no tile is tried.
     ripe: usize,
+    /// See [`Pace::is_large`].
+    is_large: bool,
 }
 
 impl<T: Take + ?Sized, const ANY: bool> Kernel for Together<'_, T, ANY> {
@@ -101,17 +112,19 @@ impl<T: Take + ?Sized, const ANY: bool> Kernel for Together<'_, T, ANY> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> Self::Output {
-        match self.tracer.structure.has_grids() {
+        let traced = match self.tracer.structure.has_grids() {
             false => self.each::<S, false>(simd),
             true => self.each::<S, true>(simd),
-        }
+        };
+        simd.fence();
+        traced
     }
 }
 
 impl<'a, T: Take + ?Sized, const ANY: bool> Together<'a, T, ANY> {
     /// The batch as a kernel; what it learns about its rays goes to `pace`.
     pub fn new(tracer: Tracer<'a>, rays: &'a Rays<'a>, to: &'a mut T, room: &'a mut Room, pace: &'a Pace) -> Self {
-        Self { tracer, rays, to, room, trial: Trial::new(pace), ripe: 0 }
+        Self { tracer, rays, to, room, trial: Trial::new(pace), ripe: 0, is_large: pace.is_large() }
     }
 
     #[inline(always)]
@@ -189,10 +202,20 @@ impl<'a, T: Take + ?Sized, const ANY: bool> Together<'a, T, ANY> {
             self.ripe = first + taken;
             return 0;
         };
-        for eight in (0..taken).step_by(LANES) {
-            let mut hits = Eight::MISSES;
-            tile.hits(simd, mesh, eight, &mut hits);
-            self.to.take_eight(first + eight, &hits);
+        if self.is_large
+            && let Some(mut to) = self.to.aligned(first, taken)
+        {
+            for eight in (0..taken).step_by(LANES) {
+                let mut hits = Eight::MISSES;
+                tile.hits(simd, mesh, eight, &mut hits);
+                to.set_eight(simd, eight, &hits);
+            }
+        } else {
+            for eight in (0..taken).step_by(LANES) {
+                let mut hits = Eight::MISSES;
+                tile.hits(simd, mesh, eight, &mut hits);
+                self.to.take_eight(first + eight, &hits);
+            }
         }
         self.trial.traced_tile(taken, count);
         taken

@@ -2,7 +2,7 @@
 
 use std::arch::x86_64::*;
 
-use super::super::{Arithmetic, Kernel, Simd, Twice, shuffles::SHUFFLES, twice};
+use super::super::{Aligned, Arithmetic, Kernel, Simd, Twice, shuffles::SHUFFLES, twice};
 
 /// Proof that the processor has AVX2, FMA, BMI1, BMI2, LZCNT and POPCNT.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -3,7 +3,7 @@
 use std::arch::x86_64::*;
 
 use super::{
-    super::{Arithmetic, Kernel, MOST_GROUP, Simd},
+    super::{Aligned, Arithmetic, Kernel, MOST_GROUP, Simd},
     Avx2,
     wide::Zmm,
 };
