@@ -402,6 +402,16 @@ impl Hit {
     /// Nothing was hit.
     pub const MISS: Self = Self { t: f32::INFINITY, primitive: MISS, u: 0.0, v: 0.0 };
 
+    /// In a row; the triangle is bits.
+    pub(crate) const fn to_row(self) -> [f32; 4] {
+        [self.t, f32::from_bits(self.primitive), self.u, self.v]
+    }
+
+    /// From such a row.
+    pub(crate) const fn of_row(&[t, primitive, u, v]: &[f32; 4]) -> Self {
+        Self { t, primitive: primitive.to_bits(), u, v }
+    }
+
     /// The order of hits along a ray: by t, and among equal t by primitive. Every accelerator reports the first in
     /// this order, so all of them agree to the bit.
     #[inline]

@@ -10,10 +10,11 @@ use glam::Vec3;
 use super::{
     frame::{Domain, Frame},
     stream::bin_size,
+    together::Take,
 };
 use crate::{
     Error,
-    ray::{Ray, Rays},
+    ray::{Eight, Hit, Ray, Rays},
     simd::Simd,
     triangle::LANES,
 };
@@ -29,6 +30,9 @@ pub fn most() -> usize {
     (8 * bin_size()).max(LEAST)
 }
 
+/// Rays whose hits are told at once.
+const RAYS: usize = 16;
+
 /// Room that [`Waiting::add`] needs: up to eight rays, and eight places written for each.
 const SPARE: usize = 2 * LANES;
 
@@ -41,7 +45,8 @@ const KEY_BITS: u32 = 3 + 3 * CELL_BITS;
 /// Added to a number from 0 to 15 it leaves the integer part in the lowest bits.
 const INTEGER: f32 = (1 << 23) as f32;
 
-/// The rays that wait, in the order in which they came, and the order in which they are to be traced.
+/// The rays that wait, in the order in which they came, and the order in which they are to be traced. Once a ray has a
+/// frame, its hit stands in its row.
 #[derive(Debug, Default)]
 pub struct Waiting {
     count: usize,
@@ -169,10 +174,72 @@ impl Waiting {
         Frame::new(&ray, domain).ok_or_else(|| ray.fault(self.index(place)))
     }
 
+    /// The rays of some places hit nothing for now; their rows are not needed any more.
+    #[inline(always)]
+    pub fn miss(&mut self, places: Range<usize>) {
+        for place in places {
+            self.answer(place, Hit::MISS);
+        }
+    }
+
+    /// What a ray of the order hits.
+    #[inline(always)]
+    pub fn answer(&mut self, place: usize, hit: Hit) {
+        let [row, _]: &mut [[f32; 4]; 2] = bytemuck::cast_mut(&mut self.rows[usize::from(self.order[place])]);
+        *row = hit.to_row();
+    }
+
+    /// Tell what all rays hit, sixteen by sixteen.
+    #[inline(always)]
+    pub fn tell<S: Simd, T: Take + ?Sized>(&self, simd: S, to: &mut T, is_large: bool) {
+        let (rows, indices) = (&self.rows[..self.count], &self.indices[..self.count]);
+        for (rows, indices) in rows.chunks(RAYS).zip(indices.chunks(RAYS)) {
+            let first = indices[0] as usize;
+            if let Ok(rows) = rows.try_into()
+                && indices[RAYS - 1] as usize == first + RAYS - 1
+            {
+                take_sixteen(simd, rows, to, first, is_large);
+                continue;
+            }
+            for (row, &index) in rows.iter().zip(indices) {
+                let [row, _]: &[[f32; 4]; 2] = bytemuck::cast_ref(row);
+                to.take(index as usize, Hit::of_row(row));
+            }
+        }
+    }
+
     /// Where in the batch a ray of the order is.
     #[inline(always)]
     pub fn index(&self, place: usize) -> usize {
         self.indices[usize::from(self.order[place])] as usize
+    }
+}
+
+/// Tell what the rays hit that have some rows.
+#[inline(always)]
+fn take_sixteen<S: Simd, T: Take + ?Sized>(simd: S, rows: &[[f32; 8]; RAYS], to: &mut T, first: usize, is_large: bool) {
+    let mut hits = [&[0.0; 4]; RAYS];
+    for lane in 0..RAYS {
+        let [row, _]: &[[f32; 4]; 2] = bytemuck::cast_ref(&rows[lane]);
+        hits[lane] = row;
+    }
+    let [t, primitive, u, v] = simd.columns(&hits);
+    let (t, primitive, u, v) = (simd.halves(t), simd.halves(primitive), simd.halves(u), simd.halves(v));
+    let mut eights = [Eight::MISSES; 2];
+    for half in 0..2 {
+        eights[half] = Eight {
+            t: simd.store(t[half]),
+            primitive: bytemuck::cast(simd.store(primitive[half])),
+            u: simd.store(u[half]),
+            v: simd.store(v[half]),
+        };
+    }
+    if is_large && let Some(mut to) = to.aligned(first, RAYS) {
+        to.set_eight(simd, 0, &eights[0]);
+        to.set_eight(simd, LANES, &eights[1]);
+    } else {
+        to.take_eight(first, &eights[0]);
+        to.take_eight(first + LANES, &eights[1]);
     }
 }
 

@@ -48,10 +48,10 @@ impl Bin {
     /// # Errors
     /// [`Error::Ray`] for an unusable ray.
     #[inline(always)]
-    pub fn fill<S: Simd>(
+    pub fn fill<S: Simd, const ANY: bool>(
         &mut self,
         simd: S,
-        waiting: &Waiting,
+        waiting: &mut Waiting,
         places: Range<usize>,
         domain: &Domain,
     ) -> Result<(), Error> {
@@ -67,6 +67,9 @@ impl Bin {
                     let frame = waiting.frame(place, domain)?;
                     (*slabs, *shears) = (frame.slabs(), *frame.shears());
                 }
+            }
+            if !ANY {
+                waiting.miss(first..places.end.min(first + LANES));
             }
         }
         self.places = places;
