@@ -8,7 +8,7 @@ use super::{
     pace::{Pace, Trial},
     packet,
     stream::{self, bin_size},
-    tile::{self, EXTENTS},
+    tile::{EXTENTS, Gather, Trace},
 };
 use crate::{
     Error,
@@ -163,12 +163,12 @@ impl<'a, T: Take + ?Sized, const ANY: bool> Together<'a, T, ANY> {
             return 0;
         }
         self.trial.begin_tile();
-        let taken = tile.gather(simd, self.rays, first, &structure.domain);
+        let taken = simd.run(Gather { tile, rays: self.rays, first, domain: &structure.domain });
         if taken == 0 {
             self.ripe = first + UNRIPE;
             return 0;
         }
-        let Some(count) = tile::trace::<S, GRIDS>(simd, structure, mesh, tile, visits, stack) else {
+        let Some(count) = simd.run(Trace::<GRIDS> { structure, mesh, tile, visits, stack }) else {
             self.trial.gave_up();
             self.ripe = first + taken;
             return 0;

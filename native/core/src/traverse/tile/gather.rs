@@ -7,7 +7,7 @@ use super::{
 };
 use crate::{
     ray::{MISS, Rays},
-    simd::{Arithmetic, Simd},
+    simd::{Arithmetic, Kernel, Simd},
     traverse::frame::{Domain, NEAR},
 };
 
@@ -20,10 +20,27 @@ const SLANT: f32 = 0.5;
 /// Sixteen rays by column: origin, direction, tmin, tmax.
 type Columns<S> = [<<S as Simd>::Wide as Arithmetic>::F32; 8];
 
-impl Tile {
-    /// Take rays from `first` on, as far as they fit together, and say how many; none where a tile is not worth it.
+/// Rays of a batch to be gathered in a tile, from `first` on, as far as they fit together; tells how many, none where a tile
+/// is not worth it.
+pub struct Gather<'a> {
+    pub tile: &'a mut Tile,
+    pub rays: &'a Rays<'a>,
+    pub first: usize,
+    pub domain: &'a Domain,
+}
+
+impl Kernel for Gather<'_> {
+    type Output = usize;
+
     #[inline(always)]
-    pub fn gather<S: Simd>(&mut self, simd: S, rays: &Rays<'_>, first: usize, domain: &Domain) -> usize {
+    fn run<S: Simd>(self, simd: S) -> usize {
+        self.tile.gather(simd, self.rays, self.first, self.domain)
+    }
+}
+
+impl Tile {
+    #[inline(always)]
+    fn gather<S: Simd>(&mut self, simd: S, rays: &Rays<'_>, first: usize, domain: &Domain) -> usize {
         let most = ((rays.len() - first) / RAYS).min(GROUPS);
         if most < FEWEST || !self.begin(rays, first, domain) {
             return 0;
