@@ -6,7 +6,7 @@ use super::{
     frame::Frame,
     kernel::{self, Entry},
     pace::Pace,
-    packet,
+    packet::{self, Packets},
     probe::{Counts, Probe},
     single::{One, Scene},
     stream::{Bin, Lists},
@@ -63,7 +63,10 @@ impl<'a> Tracer<'a> {
         if !EXTENTS.contains(&self.structure.domain.half_extent) {
             return self.occluded(rays, occluded);
         }
-        self.with_room(|room| self.level.run(Packets { tracer: self, rays, occluded, room }))
+        self.with_room(|Room { packet: memory, stack, .. }| match self.structure.has_grids() {
+            false => self.level.run(Packets::<_, false> { tracer: self, rays, memory, stack, to: occluded, place: 0 }),
+            true => self.level.run(Packets::<_, true> { tracer: self, rays, memory, stack, to: occluded, place: 0 }),
+        })
     }
 
     /// What the closest-hit query of every ray costs where it walks alone, on the calling thread.
@@ -162,27 +165,6 @@ impl<F: FnMut(usize, &Frame, Hit, P), P: Probe + Default> Singles<'_, F, P> {
             (self.take)(index, &frame, hit, probe);
         }
         Ok(())
-    }
-}
-
-/// Rays of which any hit is wanted, in packets.
-struct Packets<'a> {
-    tracer: Tracer<'a>,
-    rays: &'a Rays<'a>,
-    occluded: &'a mut [bool],
-    room: &'a mut Room,
-}
-
-impl Kernel for Packets<'_> {
-    type Output = Result<(), Error>;
-
-    #[inline(always)]
-    fn run<S: Simd>(self, simd: S) -> Self::Output {
-        let Self { tracer, rays, occluded, room: Room { packet, stack, .. } } = self;
-        match tracer.structure.has_grids() {
-            false => packet::each::<S, _, false>(simd, tracer, rays, (packet, stack), (occluded, 0)),
-            true => packet::each::<S, _, true>(simd, tracer, rays, (packet, stack), (occluded, 0)),
-        }
     }
 }
 

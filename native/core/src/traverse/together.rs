@@ -6,7 +6,7 @@ use super::{
     batch::Room,
     frame::Domain,
     pace::{Pace, Trial},
-    packet,
+    packet::Packets,
     stream::{self, bin_size},
     tile::{EXTENTS, Gather, Trace},
 };
@@ -207,7 +207,8 @@ impl<'a, T: Take + ?Sized, const ANY: bool> Together<'a, T, ANY> {
             return Ok(0);
         }
         self.trial.begin_tile();
-        packet::each::<S, T, GRIDS>(simd, self.tracer, &rays, (packet, stack), (&mut *self.to, first))?;
+        let (tracer, to) = (self.tracer, &mut *self.to);
+        simd.run(Packets::<T, GRIDS> { tracer, rays: &rays, memory: packet, stack, to, place: first })?;
         self.trial.traced_tile(rays.len(), usize::MAX);
         Ok(rays.len())
     }

@@ -38,7 +38,7 @@ use crate::{
     Error, Mesh,
     accel::structure::{Node, NodeRef, Structure, Target, View},
     ray::{Eight, MISS, Rays},
-    simd::Simd,
+    simd::{Kernel, Simd},
     triangle::{Block, LANES},
 };
 
@@ -75,26 +75,32 @@ impl Default for Memory {
     }
 }
 
-/// Tell of every ray whether it hits anything; `place` is that of the first one's answer.
-///
-/// # Errors
-/// [`Error::Ray`] for an unusable ray.
-#[inline(always)]
-pub fn each<S: Simd, T: Take + ?Sized, const GRIDS: bool>(
-    simd: S,
-    tracer: Tracer<'_>,
-    rays: &Rays<'_>,
-    room: (&mut Memory, &mut [Entry]),
-    to: (&mut T, usize),
-) -> Result<(), Error> {
-    if S::IS_WIDE {
-        each_of::<S, T, GRIDS, { PARTS[0] }>(simd, tracer, rays, room, to)
-    } else {
-        each_of::<S, T, GRIDS, { PARTS[1] }>(simd, tracer, rays, room, to)
+/// Rays of which is to be told whether they hit anything; `place` is that of the first one's answer.
+pub struct Packets<'a, T: ?Sized, const GRIDS: bool> {
+    pub tracer: Tracer<'a>,
+    pub rays: &'a Rays<'a>,
+    pub memory: &'a mut Memory,
+    pub stack: &'a mut [Entry],
+    pub to: &'a mut T,
+    pub place: usize,
+}
+
+impl<T: Take + ?Sized, const GRIDS: bool> Kernel for Packets<'_, T, GRIDS> {
+    /// [`Error::Ray`] for an unusable ray.
+    type Output = Result<(), Error>;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, simd: S) -> Self::Output {
+        let Self { tracer, rays, memory, stack, to, place } = self;
+        if S::IS_WIDE {
+            each_of::<S, T, GRIDS, { PARTS[0] }>(simd, tracer, rays, (memory, stack), (to, place))
+        } else {
+            each_of::<S, T, GRIDS, { PARTS[1] }>(simd, tracer, rays, (memory, stack), (to, place))
+        }
     }
 }
 
-/// The same in packets of so many parts.
+/// Trace rays in packets of so many parts.
 #[inline(always)]
 fn each_of<S: Simd, T: Take + ?Sized, const GRIDS: bool, const PARTS: usize>(
     simd: S,
