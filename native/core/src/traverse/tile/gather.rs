@@ -21,7 +21,8 @@ const SLANT: f32 = 0.5;
 type Columns<S> = [<<S as Simd>::Wide as Arithmetic>::F32; 8];
 
 /// Rays of a batch to be gathered in a tile, from `first` on, as far as they fit together; tells how many, none where a tile
-/// is not worth it.
+/// is not worth it. Where it also asked for the lines in which the next tile begins, five scenes took 1.03 times as long
+/// (Zen 5).
 pub struct Gather<'a> {
     pub tile: &'a mut Tile,
     pub rays: &'a Rays<'a>,
