@@ -16,6 +16,8 @@ mod twice;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
+use bytemuck::{Pod, Zeroable};
+
 pub use guess::guessed;
 #[cfg(target_arch = "aarch64")]
 pub use neon::Neon;
@@ -23,8 +25,6 @@ pub use portable::Portable;
 pub use twice::Twice;
 #[cfg(target_arch = "x86_64")]
 pub use x86::{Avx2, Avx512};
-
-use bytemuck::{Pod, Zeroable};
 
 /// Arithmetic on vectors of some number of lanes, which are numbered from 0.
 ///

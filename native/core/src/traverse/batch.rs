@@ -10,8 +10,9 @@ use super::{
     probe::{Counts, Probe},
     single::{One, Scene},
     stream::{Bin, Lists},
+    take::Take,
     tile::{EXTENTS, Tile, Visit},
-    together::{Take, Together},
+    together::Together,
     waiting::{self, Waiting},
 };
 use crate::{

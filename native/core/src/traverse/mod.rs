@@ -17,6 +17,7 @@ pub mod probe;
 mod setup;
 mod single;
 mod stream;
+mod take;
 mod tetrahedra;
 mod tile;
 mod together;

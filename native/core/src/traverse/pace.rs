@@ -50,7 +50,7 @@ const FEW_TILES: Terms =
 const FEW: usize = 1 << 18;
 
 /// Fewer rays of which any hit is wanted go in streams. With a limit of [`FEW`], ambient occlusion of 100 to 230 thousand
-/// rays took up to 1.8 times as long (hospital).
+/// rays took up to 1.9 times as long (hospital).
 const LEAST_PACKED: usize = 1 << 16;
 
 /// Where any hit will do: packets and streams differ by less than half, and a stream must be long to show what it can. To
@@ -88,8 +88,8 @@ impl Pace {
         Self { is_large, ..Self::new(if is_large { &TILES } else { &FEW_TILES }) }
     }
 
-    /// Whether the closest hits of so many rays are wanted that they fill the caches, four megabytes: those of tiles are
-    /// then written past them. So a million camera rays take 1/1.03 to 1/1.1 of the time where they see large triangles,
+    /// Whether the closest hits of so many rays are wanted that they fill the caches, four megabytes: they are then written
+    /// past them. So a million camera rays take 1/1.03 to 1/1.1 of the time where they see large triangles,
     /// and as long where they see scans (Zen 5).
     pub fn is_large(&self) -> bool {
         self.is_large

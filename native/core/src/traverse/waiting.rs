@@ -10,7 +10,7 @@ use glam::Vec3;
 use super::{
     frame::{Domain, Frame},
     stream::bin_size,
-    together::Take,
+    take::Take,
 };
 use crate::{
     Error,
@@ -19,7 +19,7 @@ use crate::{
     triangle::LANES,
 };
 
-/// The most rays that wait: eight bins, but at least so many. Their numbers fit into 16 bits. Of 8 to 64 thousand, with
+/// The most rays that wait, but for eight more: eight bins, but at least so many. Their numbers fit into 16 bits. Of 8 to 64 thousand, with
 /// 512 KiB of second-level cache and rays in the order of pixels, none was the fastest everywhere, and 64 thousand cost
 /// up to 15% (ambient occlusion on the dragon).
 ///

@@ -143,7 +143,7 @@ macro_rules! vectors {
         #[inline(always)]
         fn stream(self, from: &[f32; 8], to: &mut [Aligned; 2]) {
             let (from, to): (*const f32, *mut f32) = (from.as_ptr(), to.as_mut_ptr().cast());
-            // SAFETY: as for `splat`; the references are to 32 bytes, and quads begin where these stores ask for it.
+            // SAFETY: as for `splat`; the references are to 32 bytes, and the type of the second begins where the stores ask for it.
             unsafe {
                 _mm_stream_ps(to, _mm_loadu_ps(from));
                 _mm_stream_ps(to.add(4), _mm_loadu_ps(from.add(4)));

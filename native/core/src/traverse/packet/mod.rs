@@ -31,7 +31,7 @@ use super::{
     probe::Silent,
     setup::Frames,
     stream::warm,
-    together::Take,
+    take::Take,
     weights::Triangles,
 };
 use crate::{
