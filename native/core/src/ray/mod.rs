@@ -1,9 +1,12 @@
 //! Batches of rays and hits in structure-of-arrays form.
 
+mod column;
 mod hits;
 
 use glam::Vec3;
 
+pub use self::column::Column;
+use self::column::Points;
 pub(crate) use self::hits::{AlignedHits, Eight};
 pub use self::hits::{Hit, Hits, HitsMut, MISS};
 
@@ -14,90 +17,12 @@ use crate::{
     triangle::LANES,
 };
 
-/// A strided, read-only column of numbers: element `i` stands at `i * stride`. Stride 0 repeats one value.
-#[derive(Debug, Clone, Copy)]
-pub struct Column<'a> {
-    values: &'a [f32],
-    stride: usize,
-}
-
-impl<'a> Column<'a> {
-    /// A contiguous column.
-    pub fn new(values: &'a [f32]) -> Self {
-        Self { values, stride: 1 }
-    }
-
-    /// A column whose elements are `stride` apart in `values`.
-    pub fn strided(values: &'a [f32], stride: usize) -> Self {
-        Self { values, stride }
-    }
-
-    /// One value for every ray.
-    pub fn constant(value: &'a f32) -> Self {
-        Self { values: std::slice::from_ref(value), stride: 0 }
-    }
-
-    /// How many rays it can serve.
-    fn capacity(&self) -> usize {
-        if self.stride == 0 { usize::MAX } else { self.values.len().div_ceil(self.stride) }
-    }
-
-    /// The values of rays `index` to `index + 7`.
-    #[inline(always)]
-    fn eight<S: Simd>(&self, simd: S, index: usize) -> S::F32 {
-        match self.stride {
-            0 => simd.splat(self.values[0]),
-            1 => simd.load(self.span(index)),
-            3 => simd.load(&spread::<22, 3>(self.span(3 * index))),
-            stride => {
-                let mut eight = [0.0; 8];
-                for lane in 0..8 {
-                    eight[lane] = self.values[(index + lane) * stride];
-                }
-                simd.load(&eight)
-            }
-        }
-    }
-
-    /// The values of rays `index` to `index + 15`.
-    #[inline(always)]
-    fn sixteen<S: Simd>(&self, simd: S, index: usize) -> <S::Wide as Arithmetic>::F32 {
-        match self.stride {
-            0 => simd.wide().splat(self.values[0]),
-            1 => simd.load_wide(self.span(index)),
-            _ => simd.both([self.eight(simd, index), self.eight(simd, index + LANES)]),
-        }
-    }
-
-    /// The values from one on.
-    #[inline(always)]
-    fn span<const N: usize>(&self, first: usize) -> &[f32; N] {
-        self.values[first..].first_chunk().expect("every column has a value for every ray")
-    }
-
-    /// The value of ray `index`.
-    #[inline(always)]
-    pub fn get(&self, index: usize) -> f32 {
-        self.values[index * self.stride]
-    }
-}
-
-/// Eight numbers that stand so many places apart, as coordinates of points do in rows.
-#[inline(always)]
-fn spread<const N: usize, const STRIDE: usize>(values: &[f32; N]) -> [f32; 8] {
-    let mut eight = [0.0; 8];
-    for lane in 0..8 {
-        eight[lane] = values[STRIDE * lane];
-    }
-    eight
-}
-
 /// A batch of rays: origin, direction (any length but zero) and the parameter interval `[tmin, tmax]`, both ends
 /// included, in lengths of the direction.
 #[derive(Debug, Clone, Copy)]
 pub struct Rays<'a> {
-    origin: [Column<'a>; 3],
-    direction: [Column<'a>; 3],
+    origin: Points<'a>,
+    direction: Points<'a>,
     tmin: Column<'a>,
     tmax: Column<'a>,
     first: usize,
@@ -144,6 +69,7 @@ impl<'a> Rays<'a> {
         if shortest < count {
             return Err(Error::Ray(format!("{count} rays, but one of the columns holds only {shortest}")));
         }
+        let [origin, direction] = [origin, direction].map(|axes| Points::new(axes, count));
         Ok(Self { origin, direction, tmin, tmax, first: 0, count })
     }
 
@@ -182,59 +108,38 @@ impl<'a> Rays<'a> {
     #[inline(always)]
     pub(crate) fn eight<S: Simd>(&self, simd: S, index: usize) -> [S::F32; 8] {
         let index = self.first + index;
-        let ([ox, oy, oz], [dx, dy, dz]) = (&self.origin, &self.direction);
-        [
-            ox.eight(simd, index),
-            oy.eight(simd, index),
-            oz.eight(simd, index),
-            dx.eight(simd, index),
-            dy.eight(simd, index),
-            dz.eight(simd, index),
-            self.tmin.eight(simd, index),
-            self.tmax.eight(simd, index),
-        ]
+        let ([ox, oy, oz], [dx, dy, dz]) = (self.origin.eight(simd, index), self.direction.eight(simd, index));
+        [ox, oy, oz, dx, dy, dz, self.tmin.eight(simd, index), self.tmax.eight(simd, index)]
     }
 
     /// Rays `index` to `index + 15`, likewise.
     #[inline(always)]
     pub(crate) fn sixteen<S: Simd>(&self, simd: S, index: usize) -> [<S::Wide as Arithmetic>::F32; 8] {
         let index = self.first + index;
-        let ([ox, oy, oz], [dx, dy, dz]) = (&self.origin, &self.direction);
-        [
-            ox.sixteen(simd, index),
-            oy.sixteen(simd, index),
-            oz.sixteen(simd, index),
-            dx.sixteen(simd, index),
-            dy.sixteen(simd, index),
-            dz.sixteen(simd, index),
-            self.tmin.sixteen(simd, index),
-            self.tmax.sixteen(simd, index),
-        ]
+        let ([ox, oy, oz], [dx, dy, dz]) = (self.origin.sixteen(simd, index), self.direction.sixteen(simd, index));
+        [ox, oy, oz, dx, dy, dz, self.tmin.sixteen(simd, index), self.tmax.sixteen(simd, index)]
     }
 
     /// Whether rays `index` and `index + 7` are there and start at one point.
     #[inline(always)]
     pub(crate) fn is_common_origin(&self, index: usize) -> bool {
         let (first, last) = (self.first + index, self.first + index + LANES - 1);
-        index + LANES <= self.count && self.origin.iter().all(|axis| axis.get(first) == axis.get(last))
+        index + LANES <= self.count && self.origin.get(first) == self.origin.get(last)
     }
 
     /// Where ray `index` starts.
     #[inline(always)]
     pub(crate) fn origin(&self, index: usize) -> [f32; 3] {
-        let [x, y, z] = &self.origin;
-        let index = self.first + index;
-        [x.get(index), y.get(index), z.get(index)]
+        self.origin.get(self.first + index)
     }
 
     /// Gather ray `index`.
     #[inline]
     pub fn get(&self, index: usize) -> Ray {
         let index = self.first + index;
-        let ([ox, oy, oz], [dx, dy, dz]) = (&self.origin, &self.direction);
         Ray {
-            origin: Vec3::new(ox.get(index), oy.get(index), oz.get(index)),
-            direction: Vec3::new(dx.get(index), dy.get(index), dz.get(index)),
+            origin: self.origin.get(index).into(),
+            direction: self.direction.get(index).into(),
             tmin: self.tmin.get(index),
             tmax: self.tmax.get(index),
         }

@@ -100,6 +100,24 @@ pub trait Simd: Arithmetic {
     fn load(self, values: &[f32; 8]) -> Self::F32;
     /// Sixteen numbers from memory.
     fn load_wide(self, values: &[f32; 16]) -> <Self::Wide as Arithmetic>::F32;
+    /// Eight points from memory, by coordinate.
+    #[inline(always)]
+    fn load_points(self, points: &[f32; 24]) -> [Self::F32; 3] {
+        let mut axes = [[0.0; 8]; 3];
+        for lane in 0..8 {
+            for axis in 0..3 {
+                axes[axis][lane] = points[3 * lane + axis];
+            }
+        }
+        [self.load(&axes[0]), self.load(&axes[1]), self.load(&axes[2])]
+    }
+    /// Sixteen points from memory, likewise.
+    #[inline(always)]
+    fn load_points_wide(self, points: &[f32; 48]) -> [<Self::Wide as Arithmetic>::F32; 3] {
+        let [low, high]: &[[f32; 24]; 2] = bytemuck::cast_ref(points);
+        let ([x, y, z], [p, q, r]) = (self.load_points(low), self.load_points(high));
+        [self.both([x, p]), self.both([y, q]), self.both([z, r])]
+    }
     /// Twice four numbers from memory.
     fn join(self, low: &[f32; 4], high: &[f32; 4]) -> Self::F32;
     /// Eight numbers to memory.

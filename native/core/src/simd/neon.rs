@@ -195,6 +195,12 @@ impl Simd for Neon {
         unsafe { [vld1q_f32(values.as_ptr()), vld1q_f32(values[4..].as_ptr())] }
     }
     #[inline(always)]
+    fn load_points(self, points: &[f32; 24]) -> [Pair; 3] {
+        // SAFETY: as for `splat`; each half of the array is 48 readable bytes, and the loads ask for no alignment.
+        let (low, high) = unsafe { (vld3q_f32(points.as_ptr()), vld3q_f32(points[12..].as_ptr())) };
+        [[low.0, high.0], [low.1, high.1], [low.2, high.2]]
+    }
+    #[inline(always)]
     fn join(self, low: &[f32; 4], high: &[f32; 4]) -> Pair {
         // SAFETY: as for `splat`; each reference is to 16 readable bytes, and the loads ask for no alignment.
         unsafe { [vld1q_f32(low.as_ptr()), vld1q_f32(high.as_ptr())] }

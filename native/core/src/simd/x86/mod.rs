@@ -87,6 +87,23 @@ macro_rules! vectors {
             // SAFETY: as for `splat`; the reference is to 32 readable bytes and the load asks for no alignment.
             unsafe { _mm256_loadu_ps(values.as_ptr()) }
         }
+        /// Coordinate `k` of point `i` is number `3 * i + k`, so those of one axis stand in lanes of their own.
+        #[inline(always)]
+        fn load_points(self, points: &[f32; 24]) -> [__m256; 3] {
+            let [a, b, c]: &[[f32; 8]; 3] = bytemuck::cast_ref(points);
+            let (a, b, c) = (self.load(a), self.load(b), self.load(c));
+            // SAFETY: as for `splat`; a token exists only where AVX2 was detected.
+            unsafe {
+                let x = _mm256_blend_ps::<0b00100100>(_mm256_blend_ps::<0b10010010>(a, b), c);
+                let y = _mm256_blend_ps::<0b01001001>(_mm256_blend_ps::<0b00100100>(a, b), c);
+                let z = _mm256_blend_ps::<0b10010010>(_mm256_blend_ps::<0b01001001>(a, b), c);
+                [
+                    _mm256_permutevar8x32_ps(x, _mm256_setr_epi32(0, 3, 6, 1, 4, 7, 2, 5)),
+                    _mm256_permutevar8x32_ps(y, _mm256_setr_epi32(1, 4, 7, 2, 5, 0, 3, 6)),
+                    _mm256_permutevar8x32_ps(z, _mm256_setr_epi32(2, 5, 0, 3, 6, 1, 4, 7)),
+                ]
+            }
+        }
         #[inline(always)]
         fn join(self, low: &[f32; 4], high: &[f32; 4]) -> __m256 {
             // SAFETY: as for `splat`; the references are to 16 readable bytes and the loads ask for no alignment.
