@@ -137,7 +137,7 @@ impl Tile {
         if met == 0 {
             return 0xff;
         }
-        let corners = self.corners(simd, mesh, quads, (best, met));
+        let corners = self.corners(simd, mesh.reader(), quads, (best, met));
         let (other, t) = (simd.store(self.exact(simd, quads, &corners).t), simd.store(t));
         let best: [u32; LANES] = bytemuck::cast(simd.store(best));
         let mut preceding = !met & 0xff;

@@ -38,6 +38,7 @@ mod leaf;
 mod rays;
 mod resolve;
 mod spans;
+mod tell;
 
 use self::{
     alone::Alone,
@@ -52,7 +53,7 @@ use crate::{
     triangle::LANES,
 };
 
-pub use self::{gather::Gather, rays::Tile};
+pub use self::{gather::Gather, rays::Tile, tell::Tell};
 
 /// Rays of a group.
 pub const RAYS: usize = 16;

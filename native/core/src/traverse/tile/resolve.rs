@@ -1,13 +1,11 @@
-//! The exact test for eight rays of a tile at once, and what it says of all winners.
+//! The exact test for eight rays of a tile at once.
 
 use super::{
     RAYS,
     rays::{QUAD, Quad, Tile},
 };
 use crate::{
-    Mesh,
     mesh::Reader,
-    ray::Eight,
     simd::Simd,
     traverse::{exact::Exact, setup::Steepest},
     triangle::LANES,
@@ -54,48 +52,12 @@ impl Tile {
         Exact::new(simd, &corners, shear, depth)
     }
 
-    /// Write the best hits of eight rays of the tile, from `first` on, in the rays' own units, over misses. To return them
-    /// would copy them by vectors wider than those they were written by. Asking for triangles two groups ahead, as streams
-    /// do, took 1/1.1 of the time where they miss every cache (soup, dragon), and up to 1.04 times as long elsewhere.
-    #[inline(always)]
-    pub(crate) fn hits<S: Simd>(&self, simd: S, mesh: &Mesh, first: usize, hits: &mut Eight) {
-        let quads = [self.quad(first / QUAD), self.quad(first / QUAD + 1)];
-        // Of all these bits, those of MISS alone are not a number.
-        let [one, other] = quads;
-        let best = eight(simd, quads, [&self.groups[one.group].best, &self.groups[other.group].best]);
-        let met = simd.le(best, best);
-        if met != 0 {
-            self.set_together(simd, mesh, quads, (best, met), hits);
-        }
-    }
-
-    #[inline(always)]
-    fn set_together<S: Simd>(
-        &self,
-        simd: S,
-        mesh: &Mesh,
-        quads: [Quad; 2],
-        (best, met): (S::F32, u32),
-        hits: &mut Eight,
-    ) {
-        let zero = simd.splat(0.0);
-        let corners = self.corners(simd, mesh, quads, (best, met));
-        let exact = self.exact(simd, quads, &corners);
-        let [one, other] = quads;
-        let scale = eight(simd, quads, [&self.exactly[one.group].scale, &self.exactly[other.group].scale]);
-        let t = simd.mul(exact.t, scale);
-        hits.primitive = bytemuck::cast(simd.store(best));
-        hits.t = simd.store(simd.if_ge(best, zero, t, simd.splat(f32::INFINITY)));
-        hits.u = simd.store(simd.if_ge(best, zero, exact.u, zero));
-        hits.v = simd.store(simd.if_ge(best, zero, exact.v, zero));
-    }
-
     /// The corners of the triangles that eight rays hit, `met`, or of others, as [`Self::exact`] takes them.
     #[inline(always)]
     pub(super) fn corners<S: Simd>(
         &self,
         simd: S,
-        mesh: &Mesh,
+        mesh: Reader<'_>,
         quads: [Quad; 2],
         (best, met): (S::F32, u32),
     ) -> [[S::F32; 3]; 3] {
@@ -107,7 +69,7 @@ impl Tile {
         for triangle in triangles {
             differ |= triangle ^ any.to_bits();
         }
-        let (mesh, order) = (mesh.reader(), self.order(quads));
+        let order = self.order(quads);
         if differ == 0 {
             self.repeated(simd, order, mesh.places(any.to_bits()))
         } else {
@@ -158,7 +120,7 @@ impl Tile {
 
 /// Numbers of two quads, from all numbers of their groups.
 #[inline(always)]
-fn eight<S: Simd>(simd: S, [one, other]: [Quad; 2], [of_one, of_other]: [&[f32; RAYS]; 2]) -> S::F32 {
+pub(super) fn eight<S: Simd>(simd: S, [one, other]: [Quad; 2], [of_one, of_other]: [&[f32; RAYS]; 2]) -> S::F32 {
     simd.join(four(of_one, one), four(of_other, other))
 }
 
