@@ -201,17 +201,20 @@ impl<'a> Reader<'a> {
         [self.numbers(a), self.numbers(b), self.numbers(c)]
     }
 
-    /// Ask for the indices of a triangle's vertices.
+    /// Ask for the indices of a triangle's vertices, if there is one of this number.
     #[inline(always)]
     pub fn warm_triangle<S: Simd>(&self, simd: S, triangle: u32) {
-        simd.prefetch(&self.triangles[triangle as usize]);
+        if let Some(indices) = self.triangle(triangle) {
+            simd.prefetch(indices);
+        }
     }
 
-    /// Ask for the corners of a triangle.
+    /// Ask for the corners of a triangle, likewise: for the first, near which the others mostly are.
     #[inline(always)]
     pub fn warm_corners<S: Simd>(&self, simd: S, triangle: u32) {
-        let [a, ..] = self.rows(triangle);
-        simd.prefetch(a);
+        if let Some(&[corner, ..]) = self.triangle(triangle) {
+            simd.prefetch(self.numbers(corner));
+        }
     }
 
     #[inline(always)]

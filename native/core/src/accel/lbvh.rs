@@ -6,13 +6,13 @@
 //! Rays through these trees take 1.2 times as long as through those of `bvh-clusters`, and that is in the leaves and just
 //! above them. Tried, with what rays then took, camera rays and bounces together over six scenes (Zen 5):
 //!
-//! * the surface area heuristic above parts of 16 to 1024 triangles (Pantaleoni and Luebke, "HLBVH", HPG 2010): 1.02 times
+//! * the surface area heuristic above parts of 16 to 1024 triangles (Pantaleoni and Luebke, "HLBVH", HPG 2010): 1.03 times
 //!   to 1/1.02, whatever the size of parts;
-//! * codes of 36 bits: 1/1.01; codes with bits for sizes (Vinkler, Bittner and Havran, "Extended Morton Codes", HPG 2017):
+//! * codes of 36 bits: 1/1.00; codes with bits for sizes (Vinkler, Bittner and Havran, "Extended Morton Codes", HPG 2017):
 //!   camera rays 1/1.025 over 13 scenes (room 1/1.13, soup 1.03 times), for a longer encoding;
-//! * wide nodes closed from the leaves up whenever they are full, by which there are a third fewer: 1/1.00;
-//! * the wide nodes of least area by true boxes: 1/1.06, but boxes would have to be known before nodes are planned, and the
-//!   table takes longer than a million camera rays would gain.
+//! * wide nodes closed from the leaves up whenever they are full, of which there are a third fewer: 1/1.00;
+//! * the wide nodes of least area by true boxes: 1/1.06, but boxes would have to be known before nodes are planned, and by
+//!   estimate the table takes longer than a million camera rays would gain.
 
 use std::ops::Range;
 

@@ -76,7 +76,8 @@ impl<'a> Column<'a> {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Points<'a> {
     axes: [Column<'a>; 3],
-    rows: bool,
+    /// Whether they are those of rows of three, of which the first has all numbers.
+    are_rows: bool,
 }
 
 impl<'a> Points<'a> {
@@ -85,15 +86,15 @@ impl<'a> Points<'a> {
         let [x, y, z] = &axes;
         let first = x.values.as_ptr();
         let follow = y.values.as_ptr() == first.wrapping_add(1) && z.values.as_ptr() == first.wrapping_add(2);
-        let rows = follow && axes.iter().all(|axis| axis.stride == 3) && x.values.len() >= 3 * count;
-        Self { axes, rows }
+        let are_rows = follow && axes.iter().all(|axis| axis.stride == 3) && x.values.len() >= 3 * count;
+        Self { axes, are_rows }
     }
 
     /// Points `index` to `index + 7`.
     #[inline(always)]
     pub(super) fn eight<S: Simd>(&self, simd: S, index: usize) -> [S::F32; 3] {
         let [x, y, z] = &self.axes;
-        if self.rows {
+        if self.are_rows {
             return simd.load_points(x.span(3 * index));
         }
         [x.eight(simd, index), y.eight(simd, index), z.eight(simd, index)]
@@ -103,7 +104,7 @@ impl<'a> Points<'a> {
     #[inline(always)]
     pub(super) fn sixteen<S: Simd>(&self, simd: S, index: usize) -> [<S::Wide as Arithmetic>::F32; 3] {
         let [x, y, z] = &self.axes;
-        if self.rows {
+        if self.are_rows {
             return simd.load_points_wide(x.span(3 * index));
         }
         [x.sixteen(simd, index), y.sixteen(simd, index), z.sixteen(simd, index)]
@@ -156,8 +157,8 @@ mod tests {
             let end = |first: usize| first + (COUNT - 1) * stride + 1;
             let points = Points::new(axes.map(|first| Column::strided(&numbers[first..end(first)], stride)), COUNT);
             let whole = Points::new(axes.map(|first| Column::strided(&numbers[first..], stride)), COUNT);
-            assert_eq!(whole.rows, layout == "rows");
-            assert!(!points.rows, "the first column ends before the last row does");
+            assert_eq!(whole.are_rows, layout == "rows");
+            assert!(!points.are_rows, "the first column ends before the last row does");
             for (points, level) in
                 [points, whole].into_iter().flat_map(|p| Level::available().into_iter().map(move |level| (p, level)))
             {

@@ -9,7 +9,7 @@ use super::{
     packet::Packets,
     stream::{self, bin_size},
     take::Take,
-    tile::{EXTENTS, Gather, Tell, Trace},
+    tile::{EXTENTS, Gather, Tell, Trace, asks_ahead},
 };
 use crate::{
     Error,
@@ -51,14 +51,6 @@ const NEIGHBOURS: f32 = 1.0 / 8.0;
 
 /// After rays of one origin that make no tile, tiles are not tried for so many.
 const UNRIPE: usize = 128;
-
-/// A tile meets many triangles where it makes a visit for every so many rays: then those that its rays hit are asked for
-/// ahead. Where they are far, camera rays so took 1/1.04 to 1/1.1 of the time (dragon, soup, room), but 1.02 times as long
-/// in meshes of [fewer](FAR), and 1.1 times where rays side by side hit the same one.
-const MANY: usize = 3;
-
-/// Meshes of at least so many triangles are far from the processor.
-const FAR: usize = 1 << 17;
 
 /// A batch and what its answers are written to.
 pub struct Together<'a, T: ?Sized, const ANY: bool> {
@@ -140,7 +132,7 @@ impl<'a, T: Take + ?Sized, const ANY: bool> Together<'a, T, ANY> {
             return 0;
         };
         let (tile, to, is_large) = (&**tile, &mut *self.to, self.is_large);
-        if count * MANY > taken && mesh.triangles().len() >= FAR {
+        if asks_ahead(mesh, taken, count) {
             simd.run(Tell::<T, true> { tile, mesh, to, first, is_large });
         } else {
             simd.run(Tell::<T, false> { tile, mesh, to, first, is_large });

@@ -53,7 +53,11 @@ use crate::{
     triangle::LANES,
 };
 
-pub use self::{gather::Gather, rays::Tile, tell::Tell};
+pub use self::{
+    gather::Gather,
+    rays::Tile,
+    tell::{Tell, asks_ahead},
+};
 
 /// Rays of a group.
 pub const RAYS: usize = 16;
