@@ -45,9 +45,8 @@ impl<const GRIDS: bool> Kernel for Alone<'_, GRIDS> {
                     tile.keep(group, lane, primitive, tile.depths(group, lane, [low, high]));
                 }
             }
-            tile.approach(simd, group);
         }
-        tile.update_far(simd);
+        tile.approach(simd, groups);
     }
 }
 

@@ -35,6 +35,7 @@ mod decide;
 mod frustum;
 mod gather;
 mod leaf;
+mod pairs;
 mod rays;
 mod resolve;
 mod spans;

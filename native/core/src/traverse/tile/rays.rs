@@ -3,7 +3,7 @@
 use bytemuck::Zeroable;
 use glam::{Vec3, Vec3A};
 
-use super::{BLOCKS, GROUPS, RAYS, Slack, spans::Spans};
+use super::{BLOCKS, GROUPS, RAYS, Slack, pairs::Pairs, spans::Spans};
 use crate::traverse::frame::{self, Domain, Frame};
 
 /// Rays along a side of a square group.
@@ -85,6 +85,8 @@ pub struct Tile {
     pub(super) domain: Domain,
     /// What groups have in common, eight by eight.
     pub spans: [Spans; BLOCKS],
+    /// Room for the tests of a block.
+    pub pairs: Pairs,
 }
 
 impl Default for Tile {
@@ -109,6 +111,7 @@ impl Default for Tile {
             exactly: [Exactly::zeroed(); GROUPS],
             domain: Domain { centre: Vec3::ZERO, half_extent: 0.0 },
             spans: [Spans::NOTHING; BLOCKS],
+            pairs: Pairs::NONE,
         }
     }
 }

@@ -142,19 +142,28 @@ impl Tile {
         holding
     }
 
-    /// Note that the farthest hit of a group has come nearer; [`Tile::update_far`] is to follow. All eight numbers are
-    /// written at once: a vector could not be read soon after one of them was.
+    /// Note that the farthest hits of some groups have come nearer. All eight numbers are written at once: a vector could not
+    /// be read soon after one of them was.
     #[inline(always)]
-    pub fn approach<S: Simd>(&mut self, simd: S, group: usize) {
-        let (this, others) = (simd.splat(greatest_of_all(simd, &self.groups[group].high)), simd.splat(f32::INFINITY));
-        let limit = simd.if_ge(simd.load(&IDENTITY[group % LANES]), simd.splat(1.0), this, others);
-        let far = &mut self.spans[group / LANES].far;
-        *far = simd.store(simd.min(limit, simd.load(far)));
+    pub fn approach<S: Simd>(&mut self, simd: S, groups: u32) {
+        let mut rest = groups;
+        while rest != 0 {
+            let group = rest.trailing_zeros() as usize % GROUPS;
+            rest &= rest - 1;
+            let (this, others) = (greatest_of_all(simd, &self.groups[group].high), simd.splat(f32::INFINITY));
+            let this = simd.splat(this);
+            let limit = simd.if_ge(simd.load(&IDENTITY[group % LANES]), simd.splat(1.0), this, others);
+            let far = &mut self.spans[group / LANES].far;
+            *far = simd.store(simd.min(limit, simd.load(far)));
+        }
+        if groups != 0 {
+            self.update_far(simd);
+        }
     }
 
     /// Find the farthest hit again.
     #[inline(always)]
-    pub fn update_far<S: Simd>(&mut self, simd: S) {
+    fn update_far<S: Simd>(&mut self, simd: S) {
         let mut far = simd.splat(f32::NEG_INFINITY);
         for spans in &self.spans {
             far = simd.max(simd.load(&spans.far), far);
