@@ -9,7 +9,7 @@ use super::{
     packet::Packets,
     stream::{self, bin_size},
     take::Take,
-    tile::{EXTENTS, Gather, Tell, Trace, asks_ahead},
+    tile::{EXTENTS, Gather, Tell, Trace},
 };
 use crate::{
     Error,
@@ -132,11 +132,7 @@ impl<'a, T: Take + ?Sized, const ANY: bool> Together<'a, T, ANY> {
             return 0;
         };
         let (tile, to, is_large) = (&**tile, &mut *self.to, self.is_large);
-        if asks_ahead(mesh, taken, count) {
-            simd.run(Tell::<T, true> { tile, mesh, to, first, is_large });
-        } else {
-            simd.run(Tell::<T, false> { tile, mesh, to, first, is_large });
-        }
+        simd.run(Tell::<T> { tile, to, first, is_large });
         self.trial.traced_tile(taken, count);
         taken
     }

@@ -42,7 +42,8 @@ impl<const GRIDS: bool> Kernel for Alone<'_, GRIDS> {
                 kernel::trace_below::<S, Silent, GRIDS, false>(&mut search, structure, node, stack);
                 let Best { low, high, primitive } = search.best;
                 if primitive != before.primitive {
-                    tile.keep(group, lane, primitive, tile.depths(group, lane, [low, high]));
+                    let place = tile.held.add(primitive, mesh.corners(primitive).map(|corner| corner.to_array()));
+                    tile.keep(group, lane, place, tile.depths(group, lane, [low, high]));
                 }
             }
         }
@@ -54,20 +55,21 @@ impl Tile {
     /// The best hit of a ray, as one that walks alone knows it.
     fn as_searched(&self, group: usize, lane: usize, frame: &Frame) -> Best {
         let rays = &self.groups[group];
-        let primitive = rays.best[lane].to_bits();
-        if primitive == MISS {
+        let place = rays.best[lane].to_bits();
+        if place == MISS {
             return Best::none(frame.tmax);
         }
+        let primitive = self.held.get(place).primitive();
         let slant = frame.direction[self.axes[2]].abs();
         let [low, high] = [rays.low[lane] / slant * (1.0 - CONVERSION), rays.high[lane] / slant * (1.0 + CONVERSION)];
         Best { low, high, primitive }
     }
 
-    fn keep(&mut self, group: usize, lane: usize, primitive: u32, [from, to]: [f32; 2]) {
+    fn keep(&mut self, group: usize, lane: usize, place: u32, [from, to]: [f32; 2]) {
         let rays = &mut self.groups[group];
         rays.low[lane] = from;
         rays.high[lane] = to;
-        rays.best[lane] = f32::from_bits(primitive);
+        rays.best[lane] = f32::from_bits(place);
     }
 
     /// From which depth to which a hit is between two parameters.

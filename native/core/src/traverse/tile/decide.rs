@@ -6,7 +6,6 @@ use super::{
     rays::{Exactly, Group, QUAD, Quad, Tile},
 };
 use crate::{
-    Mesh,
     simd::{Kernel, Simd},
     triangle::{Block, LANES},
 };
@@ -15,11 +14,12 @@ use crate::{
 /// A kernel of its own: as part of the loop that comes here now and then, it made camera rays take 1.03 times as long.
 pub struct Decide<'a> {
     pub tile: &'a mut Tile,
-    pub mesh: &'a Mesh,
     pub group: usize,
     pub lanes: u32,
     pub block: &'a Block,
     pub triangle: usize,
+    /// Where the tile holds it.
+    pub place: u32,
 }
 
 impl Kernel for Decide<'_> {
@@ -27,8 +27,8 @@ impl Kernel for Decide<'_> {
 
     #[inline(always)]
     fn run<S: Simd>(self, simd: S) -> bool {
-        let Self { tile, mesh, group, lanes, block, triangle } = self;
-        tile.decide(simd, mesh, (group, lanes), block, triangle)
+        let Self { tile, group, lanes, block, triangle, place } = self;
+        tile.decide(simd, (group, lanes), (block, triangle), place)
     }
 }
 
@@ -37,10 +37,9 @@ impl Tile {
     fn decide<S: Simd>(
         &mut self,
         simd: S,
-        mesh: &Mesh,
         (group, lanes): (usize, u32),
-        block: &Block,
-        triangle: usize,
+        (block, triangle): (&Block, usize),
+        place: u32,
     ) -> bool {
         let order = self.order([Quad { group, quad: 0 }; 2]);
         let corners = self.repeated(simd, order, block.corners(triangle).each_ref());
@@ -58,7 +57,7 @@ impl Tile {
                 hit |= self.ask(quads, lanes & exact.unclear, (block, triangle), &mut each);
                 t = simd.load(&each);
             }
-            is_nearer |= self.offer(simd, mesh, quads, hit, t, block.primitive[triangle]);
+            is_nearer |= self.offer(simd, quads, hit, t, place);
         }
         is_nearer
     }
@@ -81,15 +80,7 @@ impl Tile {
     /// Make exact hits of a triangle, in some of eight rays of a group, the best of theirs that they are; true where there
     /// is such.
     #[inline(always)]
-    fn offer<S: Simd>(
-        &mut self,
-        simd: S,
-        mesh: &Mesh,
-        quads: [Quad; 2],
-        lanes: u32,
-        t: S::F32,
-        primitive: u32,
-    ) -> bool {
+    fn offer<S: Simd>(&mut self, simd: S, quads: [Quad; 2], lanes: u32, t: S::F32, place: u32) -> bool {
         let [Quad { group, quad }, _] = quads;
         let first = quad * QUAD;
         let Exactly { interval: [tmin, tmax], direction, .. } = &self.exactly[group];
@@ -107,7 +98,7 @@ impl Tile {
         let mut nearer = lanes & !simd.le(low, to);
         let equal = lanes & !nearer & simd.le(from, high);
         if equal != 0 {
-            nearer |= equal & self.preceding(simd, mesh, quads, best, t, primitive);
+            nearer |= equal & self.preceding(simd, quads, best, t, place);
         }
         if nearer == 0 {
             return false;
@@ -115,7 +106,7 @@ impl Tile {
         let rays = &mut self.groups[group];
         *half_mut(&mut rays.low, first) = simd.store(simd.select(nearer, from, low));
         *half_mut(&mut rays.high, first) = simd.store(simd.select(nearer, to, high));
-        let winner = simd.splat(f32::from_bits(primitive));
+        let winner = simd.splat(f32::from_bits(place));
         *half_mut(&mut rays.best, first) = simd.store(simd.select(nearer, winner, best));
         true
     }
@@ -124,22 +115,15 @@ impl Tile {
     ///
     /// [`Hit::precedes`]: crate::ray::Hit::precedes
     #[inline(always)]
-    fn preceding<S: Simd>(
-        &self,
-        simd: S,
-        mesh: &Mesh,
-        quads: [Quad; 2],
-        best: S::F32,
-        t: S::F32,
-        primitive: u32,
-    ) -> u32 {
+    fn preceding<S: Simd>(&self, simd: S, quads: [Quad; 2], best: S::F32, t: S::F32, place: u32) -> u32 {
         let met = simd.le(best, best);
         if met == 0 {
             return 0xff;
         }
-        let corners = self.corners(simd, mesh.reader(), quads, (best, met));
-        let (other, t) = (simd.store(self.exact(simd, quads, &corners).t), simd.store(t));
-        let best: [u32; LANES] = bytemuck::cast(simd.store(best));
+        let found = self.found(simd, quads, (best, met));
+        let (other, t) = (simd.store(self.exact(simd, quads, &found.corners).t), simd.store(t));
+        let best: [u32; LANES] = bytemuck::cast(simd.store(found.primitive));
+        let primitive = self.held.get(place).primitive();
         let mut preceding = !met & 0xff;
         for lane in 0..LANES {
             let precedes = (t[lane] < other[lane]) | ((t[lane] == other[lane]) & (primitive < best[lane]));

@@ -7,7 +7,6 @@ use super::{
     rays::{Group, Tile},
 };
 use crate::{
-    Mesh,
     simd::{Arithmetic, Simd},
     triangle::{Block, LANES},
 };
@@ -68,7 +67,7 @@ impl Planes {
     /// nobody can predict is asked once a block: how many are left. With branches for every group and triangle instead,
     /// camera rays took 1.06 (room) to 1.3 times as long (soup; in the mean 1.15, on Zen 5).
     #[inline(always)]
-    pub fn test<S: Simd>(&self, simd: S, tile: &mut Tile, mesh: &Mesh, block: &Block, count: u32, groups: u32) {
+    pub fn test<S: Simd>(&self, simd: S, tile: &mut Tile, block: &Block, count: u32, groups: u32) {
         let (mut near, mut rest) = (PairSet::default(), groups);
         while rest != 0 {
             let group = rest.trailing_zeros() as usize % GROUPS;
@@ -80,11 +79,12 @@ impl Planes {
             let (least, is_possible) = self.inside(simd, &tile.groups[pair.group()], pair.lane());
             tile.pairs.push_if(is_possible, pair, least);
         }
-        let mut nearer = 0;
+        let (first, mut nearer) = (tile.held.begin(), 0);
         for index in 0..tile.pairs.len() {
             let (pair, &least) = tile.pairs.get(index);
-            nearer |= u32::from(self.triangle(simd, tile, mesh, (pair, &least), block)) << pair.group();
+            nearer |= u32::from(self.triangle(simd, tile, (pair, &least), block, first)) << pair.group();
         }
+        tile.held.keep_if(nearer != 0);
         tile.approach(simd, nearer);
     }
 
@@ -121,15 +121,15 @@ impl Planes {
         (simd.store_wide(least), possible != 0)
     }
 
-    /// Test one triangle against a group; true where some best hit came nearer.
+    /// Test one triangle of a block, for whose first there is a place, against a group; true where some best hit came nearer.
     #[inline(always)]
     fn triangle<S: Simd>(
         &self,
         simd: S,
         tile: &mut Tile,
-        mesh: &Mesh,
         (pair, least): (Pair, &[f32; RAYS]),
         block: &Block,
+        first: usize,
     ) -> bool {
         let (wide, group, lane) = (simd.wide(), pair.group(), pair.lane());
         let rays = &tile.groups[group];
@@ -148,14 +148,15 @@ impl Planes {
         let certain = wide.if_ge(from, near, wide.if_ge(least, doubt, to, nothing), nothing);
         let accepted = wide.le(certain, low);
         let beyond = wide.le(high, from) | wide.le(to, near);
-        let winner = f32::from_bits(block.primitive[lane]);
+        let place = (first + lane) as u32;
         // Also where none is accepted, which nobody can predict.
+        tile.held.set(block, lane);
         let rays = &mut tile.groups[group];
         rays.low = simd.store_wide(wide.if_ge(low, certain, from, low));
         rays.high = simd.store_wide(wide.if_ge(low, certain, to, high));
-        rays.best = simd.store_wide(wide.if_ge(low, certain, wide.splat(winner), best));
+        rays.best = simd.store_wide(wide.if_ge(low, certain, wide.splat(f32::from_bits(place)), best));
         let unclear = possible & !accepted & !beyond;
-        let decided = unclear != 0 && simd.run(Decide { tile, mesh, group, lanes: unclear, block, triangle: lane });
+        let decided = unclear != 0 && simd.run(Decide { tile, group, lanes: unclear, block, triangle: lane, place });
         decided || accepted != 0
     }
 }

@@ -34,6 +34,7 @@ mod alone;
 mod decide;
 mod frustum;
 mod gather;
+mod held;
 mod leaf;
 mod pairs;
 mod rays;
@@ -54,11 +55,7 @@ use crate::{
     triangle::LANES,
 };
 
-pub use self::{
-    gather::Gather,
-    rays::Tile,
-    tell::{Tell, asks_ahead},
-};
+pub use self::{gather::Gather, rays::Tile, tell::Tell};
 
 /// Rays of a group.
 pub const RAYS: usize = 16;
@@ -122,6 +119,7 @@ impl<const GRIDS: bool> Kernel for Trace<'_, GRIDS> {
         let Self { structure, mesh, tile, visits, stack } = self;
         let projector = Projector::new(simd, tile);
         let mut planes = Planes::default();
+        tile.held.clear();
         visits.clear();
         visits.push(tile.everything(structure.root));
         // Visits from `floor` up are in the lazy cell that the tile is in.
@@ -161,7 +159,7 @@ impl<const GRIDS: bool> Kernel for Trace<'_, GRIDS> {
                 Target::Leaf { block, count } => {
                     let block = &here.blocks[block as usize];
                     planes.set(simd, tile, block);
-                    planes.test(simd, tile, mesh, block, count, groups);
+                    planes.test(simd, tile, block, count, groups);
                 }
                 _ => {
                     alone += groups.count_ones() as usize * RAYS;

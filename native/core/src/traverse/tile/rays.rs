@@ -3,7 +3,7 @@
 use bytemuck::Zeroable;
 use glam::{Vec3, Vec3A};
 
-use super::{BLOCKS, GROUPS, RAYS, Slack, pairs::Pairs, spans::Spans};
+use super::{BLOCKS, GROUPS, RAYS, Slack, held::Held, pairs::Pairs, spans::Spans};
 use crate::traverse::frame::{self, Domain, Frame};
 
 /// Rays along a side of a square group.
@@ -29,7 +29,8 @@ pub struct Group {
     pub low: [f32; RAYS],
     /// Hits from this depth on are certainly behind the best one, or the end of the interval.
     pub high: [f32; RAYS],
-    /// The triangle of the best hit, or [`MISS`](crate::ray::MISS), as bits that no vector operation changes.
+    /// The place of the best hit's triangle among those [`held`](Tile::held), or [`MISS`](crate::ray::MISS), as bits that no
+    /// vector operation changes.
     pub best: [f32; RAYS],
 }
 
@@ -85,6 +86,8 @@ pub struct Tile {
     pub(super) domain: Domain,
     /// What groups have in common, eight by eight.
     pub spans: [Spans; BLOCKS],
+    /// The triangles of the best hits.
+    pub held: Held,
     /// Room for the tests of a block.
     pub pairs: Pairs,
 }
@@ -111,6 +114,7 @@ impl Default for Tile {
             exactly: [Exactly::zeroed(); GROUPS],
             domain: Domain { centre: Vec3::ZERO, half_extent: 0.0 },
             spans: [Spans::NOTHING; BLOCKS],
+            held: Held::default(),
             pairs: Pairs::NONE,
         }
     }

@@ -5,11 +5,18 @@ use super::{
     rays::{QUAD, Quad, Tile},
 };
 use crate::{
-    mesh::Reader,
     simd::Simd,
     traverse::{exact::Exact, setup::Steepest},
     triangle::LANES,
 };
+
+/// Eight triangles.
+pub(super) struct Found<S: Simd> {
+    /// Their corners relative to the origin, as [`Tile::exact`] takes them.
+    pub corners: [[S::F32; 3]; 3],
+    /// Their numbers in the mesh, as bits.
+    pub primitive: S::F32,
+}
 
 impl Tile {
     /// The order of axes in which [`Self::exact`] takes the corners: the tile's, or, where each ray has its own, that of
@@ -52,56 +59,45 @@ impl Tile {
         Exact::new(simd, &corners, shear, depth)
     }
 
-    /// The corners of the triangles that eight rays hit, `met`, or of others, as [`Self::exact`] takes them.
+    /// The triangles at some places, of which those of the lanes `met` are wanted.
     #[inline(always)]
-    pub(super) fn corners<S: Simd>(
-        &self,
-        simd: S,
-        mesh: Reader<'_>,
-        quads: [Quad; 2],
-        (best, met): (S::F32, u32),
-    ) -> [[S::F32; 3]; 3] {
+    pub(super) fn found<S: Simd>(&self, simd: S, quads: [Quad; 2], (best, met): (S::F32, u32)) -> Found<S> {
         let any = simd.store(best)[met.trailing_zeros() as usize % LANES];
-        let triangles = simd.if_ge(best, simd.splat(0.0), best, simd.splat(any));
-        let triangles: [u32; LANES] = bytemuck::cast(simd.store(triangles));
+        let places = simd.if_ge(best, simd.splat(0.0), best, simd.splat(any));
+        let places: [u32; LANES] = bytemuck::cast(simd.store(places));
         // Compared as integers: a host may have told the processor to take all of these small numbers for zero.
         let mut differ = 0;
-        for triangle in triangles {
-            differ |= triangle ^ any.to_bits();
+        for place in places {
+            differ |= place ^ any.to_bits();
         }
         let order = self.order(quads);
         if differ == 0 {
-            self.repeated(simd, order, mesh.places(any.to_bits()))
-        } else {
-            self.gathered(simd, order, mesh, &triangles)
+            let triangle = self.held.get(any.to_bits());
+            let corners = self.repeated(simd, order, triangle.corners().each_ref());
+            return Found { corners, primitive: simd.splat(f32::from_bits(triangle.primitive())) };
         }
+        self.gathered(simd, order, &places)
     }
 
-    /// Corners of eight triangles relative to the origin, in an order of axes.
+    /// Eight triangles, their corners in an order of axes.
     #[inline(always)]
-    fn gathered<S: Simd>(
-        &self,
-        simd: S,
-        order: [usize; 3],
-        mesh: Reader<'_>,
-        triangles: &[u32; LANES],
-    ) -> [[S::F32; 3]; 3] {
+    fn gathered<S: Simd>(&self, simd: S, order: [usize; 3], places: &[u32; LANES]) -> Found<S> {
         let [mut first, mut last] = [[simd.splat(0.0); LANES]; 2];
         for lane in 0..LANES {
-            let [a, b, c] = mesh.rows(triangles[lane]);
+            let [a, b, c] = self.held.get(places[lane]).rows();
             first[lane] = simd.join(a, b);
             last[lane] = simd.join(c, c);
         }
         let (first, last) = (simd.transpose(first), simd.transpose(last));
-        let places = [[first[0], first[1], first[2]], [first[4], first[5], first[6]], [last[0], last[1], last[2]]];
-        let mut relative = places;
+        let mut corners = [[first[0], first[1], first[2]], [first[4], first[5], first[6]], [last[0], last[1], last[2]]];
+        let places = corners;
         for c in 0..3 {
             for k in 0..3 {
                 let axis = order[k];
-                relative[c][k] = simd.sub(places[c][axis], simd.splat(self.origin[axis]));
+                corners[c][k] = simd.sub(places[c][axis], simd.splat(self.origin[axis]));
             }
         }
-        relative
+        Found { corners, primitive: first[3] }
     }
 
     /// Corners of one triangle relative to the origin, in an order of axes, in every lane.
