@@ -155,7 +155,7 @@ class ESPALIER_PG_settings(bpy.types.PropertyGroup):
         options=STATIC,
     )
     expected_rays: FloatProperty(
-        name="Expected Mrays",
+        name="Mrays Ahead",
         description="Rays the accelerator is built for, in millions; 0 expects the rays of one frame. "
         "With more rays to come, the hybrids spend more time on the build",
         default=0.0,
