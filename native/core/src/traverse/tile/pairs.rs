@@ -83,3 +83,37 @@ impl Pairs {
         (self.pair[index % MOST], &self.least[index % MOST])
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pairs_come_group_by_group_and_those_that_count_are_kept() {
+        let mut set = PairSet::default();
+        for (group, lanes) in [(GROUPS - 1, 0x81), (0, 0xff), (7, 0), (8, 0x12)] {
+            set.add(group, lanes);
+        }
+        let mut pairs = Pairs::NONE;
+        let mut places = Vec::new();
+        while let Some(pair) = set.take() {
+            places.push((pair.group(), pair.lane()));
+            pairs.push_if(pair.lane() % 2 == 1, pair, [pair.lane() as f32; RAYS]);
+        }
+        let expected = (0..LANES).map(|lane| (0, lane)).chain([(8, 1), (8, 4), (GROUPS - 1, 0), (GROUPS - 1, 7)]);
+        assert!(places.into_iter().eq(expected));
+        let kept = (0..pairs.len()).map(|index| pairs.get(index)).map(|(pair, least)| (pair.group(), least[3]));
+        assert!(kept.eq([(0, 1.0), (0, 3.0), (0, 5.0), (0, 7.0), (8, 1.0), (GROUPS - 1, 7.0)]));
+    }
+
+    #[test]
+    fn there_is_room_for_every_pair() {
+        let (mut set, mut pairs) = (PairSet::default(), Pairs::NONE);
+        (0..GROUPS).for_each(|group| set.add(group, 0xff));
+        while let Some(pair) = set.take() {
+            pairs.push_if(true, pair, [0.0; RAYS]);
+        }
+        assert_eq!(pairs.len(), MOST);
+        assert!((0..MOST).all(|index| usize::from(pairs.get(index).0.0) == index));
+    }
+}
