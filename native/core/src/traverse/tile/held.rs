@@ -77,7 +77,7 @@ impl Held {
     pub fn add(&mut self, primitive: u32, corners: [[f32; 3]; 3]) -> u32 {
         let place = self.begin();
         self.triangles[place] = Triangle::new(primitive, corners);
-        self.keep_if(true);
+        self.count += 1;
         place as u32
     }
 
