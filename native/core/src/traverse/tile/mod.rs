@@ -104,8 +104,8 @@ const MOST_VISITS: usize = 8 * GROUPS * RAYS;
 /// are one each, or nothing where the others become [too many](MOST_VISITS): then the hits are not to be used. A kernel of
 /// its own, as [`Gather`]: within the loop over a batch, camera rays took 1.03 times as long.
 ///
-/// A third of the time goes by waiting for nodes and leaves (a second pass takes 0.6 to 0.7 of the first). Two tiles that take
-/// turns at every node, so that what one has asked for arrives while the other is busy, took 1/1.03 to 1/1.05 of the time in
+/// A part of the time goes by waiting for nodes and leaves: a second pass over the same tile, by which branches are learnt,
+/// too, takes some 0.5 to 0.7 of the first. Two tiles that take turns at every node, so that what one has asked for arrives while the other is busy, took 1/1.03 to 1/1.05 of the time in
 /// the dragon, stadium and room, and 1.00 to 1.07 times in seven other scenes; leaves that wait for the next leaf 1/1.04,
 /// 1/1.06 and 1/1.01, and 1.00 to 1.02 times (Zen 5).
 pub struct Trace<'a, const GRIDS: bool> {
