@@ -138,6 +138,27 @@ pub trait Simd: Arithmetic {
         let [[a, e], [b, f], [c, g], [d, h]] = &rows;
         [self.both([self.join(a, b), self.join(c, d)]), self.both([self.join(e, f), self.join(g, h)])]
     }
+    /// The numbers of the first sixteen bits that are set; behind the last any.
+    #[inline(always)]
+    fn places(self, set: u64) -> [u32; 16] {
+        let (mut places, mut rest) = ([0; 16], set);
+        for place in &mut places {
+            *place = rest.trailing_zeros() % 64;
+            rest &= rest.wrapping_sub(1);
+        }
+        places
+    }
+    /// The numbers at some places of sixty-four.
+    #[inline(always)]
+    fn pick(self, table: [<Self::Wide as Arithmetic>::F32; 4], places: &[u32; 16]) -> <Self::Wide as Arithmetic>::F32 {
+        let [a, b, c, d] = table;
+        let rows = [self.store_wide(a), self.store_wide(b), self.store_wide(c), self.store_wide(d)];
+        let (table, mut picked): ([f32; 64], _) = (bytemuck::cast(rows), [0.0; 16]);
+        for lane in 0..16 {
+            picked[lane] = table[places[lane] as usize % 64];
+        }
+        self.load_wide(&picked)
+    }
     /// Rows to columns.
     fn transpose(self, rows: [Self::F32; 8]) -> [Self::F32; 8];
     /// The same numbers in double precision.

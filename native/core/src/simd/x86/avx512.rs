@@ -136,6 +136,32 @@ impl Simd for Avx512 {
         unsafe { _mm512_storeu_ps(values.as_mut_ptr(), value) };
         values
     }
+    #[inline(always)]
+    fn places(self, set: u64) -> [u32; 16] {
+        const ALL: [u8; 64] = {
+            let (mut all, mut place) = ([0; 64], 0);
+            while place < 64 {
+                all[place] = place as u8;
+                place += 1;
+            }
+            all
+        };
+        // SAFETY: a token exists only where AVX-512 F and VBMI2 were detected; the array has 64 readable bytes.
+        unsafe {
+            let first = _mm512_maskz_compress_epi8(set, _mm512_loadu_si512(ALL.as_ptr().cast()));
+            bytemuck::cast(self.store_wide(_mm512_castsi512_ps(_mm512_cvtepu8_epi32(_mm512_castsi512_si128(first)))))
+        }
+    }
+    #[inline(always)]
+    fn pick(self, [a, b, c, d]: [__m512; 4], places: &[u32; 16]) -> __m512 {
+        let places = self.load_wide(bytemuck::cast_ref(places));
+        // SAFETY: as for `both`.
+        unsafe {
+            let places = _mm512_castps_si512(places);
+            let (low, high) = (_mm512_permutex2var_ps(a, places, b), _mm512_permutex2var_ps(c, places, d));
+            _mm512_mask_blend_ps(_mm512_test_epi32_mask(places, _mm512_set1_epi32(32)), low, high)
+        }
+    }
     #[inline]
     fn run<K: Kernel>(self, kernel: K) -> K::Output {
         // SAFETY: a token exists only where every feature of `enter_avx512` was detected.

@@ -2,7 +2,8 @@
 //! first compared with the box around the rays' segments, all eight at once, and only then with the rays: short rays
 //! that begin side by side, as those of ambient occlusion, pass by most boxes together. After Wald, Slusallek, Benthin
 //! and Wagner, "Interactive Rendering with Coherent Ray Tracing", Eurographics 2001, and Boulos, Wald and Shirley,
-//! "Geometric and Arithmetic Culling Methods for Entire Ray Packets", University of Utah UUCS-06-010, 2006.
+//! "Geometric and Arithmetic Culling Methods for Entire Ray Packets", University of Utah UUCS-06-010, 2006. Rays that are
+//! left over for a subtree go on in a packet of one vector ([`narrow`]), or one by one ([`alone`]).
 //!
 //! A ray meets a child here if and only if it does so alone, to the bit: both planes of an axis are tested with the
 //! bias that they have for the ray's direction, and the lesser is the near one. The box around the segments culls no
@@ -16,37 +17,39 @@
 //! children in the order of most rays' octant. Of 64 rays (Zen 5) bounces took 1.2 times (hospital, room) to 2.8 times
 //! (Sibenik) as long as in streams, and still 1.02 to 2.1 times with the rays sorted as streams have them; any-hit rays so
 //! sorted took 0.93 to 1.7 times as long as what is faster here of streams and packets.
+//!
+//! Copies of one and the same program file differ by up to a fifth in the cheapest of these (vianney, hospital; camera rays
+//! and bounces by less than a twentieth), each copy every time it runs: it is where in memory the system has put its pages.
 
+mod alone;
 mod leaf;
+mod narrow;
 mod rays;
+mod walk;
 
 use bytemuck::Zeroable;
 
-use self::rays::{Packet, RAYS};
+use self::{
+    alone::{Alone, Apart},
+    narrow::Narrow,
+    rays::{Packet, RAYS},
+    walk::{Visit, Walk},
+};
 use super::{
     Tracer,
     frame::{Domain, Frame},
     kernel::{self, Entry},
-    leaf::{Best, Search},
     probe::Silent,
     setup::Frames,
-    stream::warm,
     take::Take,
-    weights::Triangles,
 };
 use crate::{
     Error, Mesh,
-    accel::structure::{Node, NodeRef, Structure, Target, View},
+    accel::structure::{Structure, View},
     ray::{Eight, MISS, Rays},
     simd::{Kernel, Simd},
-    triangle::{Block, LANES},
+    triangle::LANES,
 };
-
-/// Fewer rays than this go on one by one from where they are. With AVX-512, 3 took 1.05 times as long, 6 took 1.03 times.
-const FEW: u32 = 4;
-
-/// Fewer rays than this are tested one by one against eight triangles, others all together against one after another.
-const FEWEST: u32 = 3;
 
 /// Vectors of sixteen rays in a packet where one is one register, and where it is two. The more there are, the less a
 /// packet costs beside its arithmetic, in branches above all that nobody can predict. Against one (Zen 5), two took 1/1.16
@@ -55,13 +58,6 @@ const PARTS: [usize; 2] = [4, 2];
 
 /// Most rays of a packet.
 const MOST: usize = RAYS * PARTS[0];
-
-/// A subtree, and which rays are to visit it.
-#[derive(Debug, Clone, Copy)]
-struct Visit {
-    node: NodeRef,
-    rays: u64,
-}
 
 /// What packets remember things in, reused from one to the next.
 pub struct Memory {
@@ -166,159 +162,14 @@ fn trace<S: Simd, const GRIDS: bool, const PARTS: usize>(
     stack: &mut [Entry],
 ) -> u64 {
     let packet = Packet::new(simd, frames, rays.origin(first), &structure.domain);
-    let Memory { visits, frames: apart } = memory;
-    let mut are_written = false;
-    let all = packet.all();
-    let mut open = all;
+    let Memory { visits, frames: written } = memory;
     visits.clear();
-    visits.push(Visit { node: structure.root, rays: all });
-    // Visits from `floor` up are in the lazy cell that the rays are in.
-    let (mut here, mut floor) = (root, 0);
-    loop {
-        if GRIDS && visits.len() == floor {
-            (here, floor) = (root, 0);
-        }
-        let Some(visit) = visits.pop() else { break };
-        let going = visit.rays & open;
-        let mut node = visit.node;
-        if GRIDS
-            && let Target::Lazy(cell) = node.target()
-            && going != 0
-            && let Some(cell) = structure.lazy.refine(cell as usize, mesh)
-        {
-            (here, floor, node) = (cell.view(), visits.len(), cell.root);
-        }
-        match node.target() {
-            Target::Branch(index) if going.count_ones() >= FEW => {
-                push(simd, &packet, here, &here.nodes[index as usize], going, visits);
-            }
-            Target::Leaf { block, count } if going.count_ones() >= FEWEST => {
-                let block = &here.blocks[block as usize];
-                let leaf = Leaf { block, count, rays, first, domain: &structure.domain };
-                open &= !leaf.hit(simd, &packet, going);
-            }
-            _ if going == 0 => {}
-            _ => {
-                if !are_written {
-                    write(simd, frames, apart);
-                    are_written = true;
-                }
-                open &= !alone::<S, GRIDS>(simd, structure, mesh, (here, node), (apart, going), stack);
-            }
-        }
-        if open == 0 {
-            break;
-        }
+    let apart = Apart { frames, written, are_written: 0 };
+    let mut walk = Walk { simd, structure, mesh, batch: (rays, first), visits, apart, stack };
+    let start = (root, structure.root);
+    if S::IS_WIDE {
+        walk.below::<GRIDS, PARTS, Narrow>(&packet, start, packet.all())
+    } else {
+        walk.below::<GRIDS, PARTS, Alone>(&packet, start, packet.all())
     }
-    all & !open
-}
-
-/// Write the frames of rays one by one.
-#[inline(always)]
-fn write<S: Simd>(simd: S, frames: &[Frames<S::Wide>], to: &mut [Frame; MOST]) {
-    let (eights, _) = to.as_chunks_mut();
-    for (frames, eights) in frames.iter().zip(eights.chunks_exact_mut(2)) {
-        let halves = Frames::halves(simd, frames);
-        halves[0].store(simd, &mut eights[0]);
-        halves[1].store(simd, &mut eights[1]);
-    }
-}
-
-/// Remember the children that some of the rays `going` meet, leaves last, so that they are visited first, and among each
-/// the largest last.
-#[inline(always)]
-fn push<S: Simd, const PARTS: usize>(
-    simd: S,
-    packet: &Packet<S, PARTS>,
-    here: View<'_>,
-    node: &Node,
-    going: u64,
-    visits: &mut Vec<Visit>,
-) {
-    let near = packet.near(simd, node);
-    let leaves = node.leaves();
-    for mut rest in [near & !leaves, near & leaves] {
-        while rest != 0 {
-            let child = rest.ilog2() as usize;
-            rest &= !(1 << child);
-            let rays = going & packet.meet(node, child);
-            if rays != 0 {
-                let node = node.child[child & (LANES - 1)];
-                warm(simd, here, node);
-                visits.push(Visit { node, rays });
-            }
-        }
-    }
-}
-
-/// A block of triangles to be tested against the rays of a packet.
-struct Leaf<'a> {
-    block: &'a Block,
-    /// Triangles in it.
-    count: u32,
-    /// A batch, and where in it the packet begins.
-    rays: &'a Rays<'a>,
-    first: usize,
-    domain: &'a Domain,
-}
-
-impl Leaf<'_> {
-    /// Which of the rays `going` hit one of the triangles.
-    #[inline(always)]
-    fn hit<S: Simd, const PARTS: usize>(&self, simd: S, packet: &Packet<S, PARTS>, going: u64) -> u64 {
-        let mut near = leaf::near(simd, packet, self.block) & ((1 << self.count) - 1);
-        if near == 0 {
-            return 0;
-        }
-        let triangles = Triangles::new(simd, self.block, packet.first);
-        let mut rest = going;
-        while near != 0 {
-            let lane = near.trailing_zeros() as usize;
-            near &= near - 1;
-            let [sure, mut unclear] = leaf::hit(&triangles, packet, rest, lane);
-            rest &= !sure;
-            while unclear != 0 {
-                let ray = unclear.trailing_zeros();
-                unclear &= unclear - 1;
-                rest &= !(u64::from(self.is_hit(lane, ray as usize)) << ray);
-            }
-            if rest == 0 {
-                break;
-            }
-        }
-        going & !rest
-    }
-
-    /// What the exact test says of a triangle and a ray.
-    #[cold]
-    #[inline(never)]
-    fn is_hit(&self, lane: usize, ray: usize) -> bool {
-        self.rays.frame(self.first + ray, self.domain).is_ok_and(|frame| self.block.intersect(lane, &frame).is_some())
-    }
-}
-
-/// Let rays go on below a node one by one; tells which of them hit anything.
-#[inline(always)]
-fn alone<S: Simd, const GRIDS: bool>(
-    simd: S,
-    structure: &Structure,
-    mesh: &Mesh,
-    (here, node): (View<'_>, NodeRef),
-    (apart, rays): (&[Frame; MOST], u64),
-    stack: &mut [Entry],
-) -> u64 {
-    let (mut rest, mut hit) = (rays, 0);
-    while rest != 0 {
-        let lane = rest.trailing_zeros();
-        rest &= rest - 1;
-        let (frame, mut silent) = (&apart[lane as usize % MOST], Silent);
-        let mut search = Search::new(simd, frame, mesh, &mut silent, Best::none(frame.tmax));
-        if let Target::Leaf { block, count } = node.target() {
-            search.block::<true>(&here.blocks[block as usize], count);
-        } else {
-            kernel::trace_below::<S, Silent, GRIDS, true>(&mut search, structure, (here, node), stack);
-        }
-        hit |= u64::from(search.best.primitive != MISS) << lane;
-    }
-    hit
 }

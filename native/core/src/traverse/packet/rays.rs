@@ -30,6 +30,8 @@ pub struct Packet<S: Simd, const PARTS: usize> {
     sides: [f32; LANES],
     /// The same, from the first origin.
     pub around: [f32; 6],
+    /// Of a narrow packet, which rays of the wide one it has.
+    places: [u32; RAYS],
 }
 
 /// Sixteen of them.
@@ -67,7 +69,22 @@ impl<S: Simd, const PARTS: usize> Packet<S, PARTS> {
             let local = first[k] - domain.centre[k];
             (around[k], around[3 + k]) = (sides[k] - local, sides[3 + k] + local);
         }
-        Self { wide: simd.wide(), parts, first, spread: -sides[6], sides, around }
+        Self { wide: simd.wide(), parts, first, spread: -sides[6], sides, around, places: [0; RAYS] }
+    }
+
+    /// Some rays of it, at most sixteen.
+    #[inline(always)]
+    pub fn narrow(&self, simd: S, rays: u64) -> Packet<S, 1> {
+        let places = simd.places(rays);
+        let Self { wide, first, spread, sides, around, .. } = *self;
+        let part = Part::pick(simd, &self.parts, &places);
+        Packet { wide, parts: [part], first, spread, sides, around, places }
+    }
+
+    /// Which ray of the batch's, from where the packet begins, is in a lane.
+    #[inline(always)]
+    pub fn place(&self, lane: usize) -> usize {
+        if PARTS == 1 { self.places[lane % RAYS] as usize } else { lane }
     }
 
     /// The rays whose interval is not empty.
@@ -150,6 +167,25 @@ impl<S: Simd> Part<S> {
         }
         let Frames { inverse, tmin, tmax, direction, origin, .. } = *frames;
         Self { inverse, bias, tmin, tmax, origin, direction }
+    }
+
+    /// Those at some places of several parts.
+    #[inline(always)]
+    fn pick<const PARTS: usize>(simd: S, parts: &[Self; PARTS], places: &[u32; RAYS]) -> Self {
+        let [a, b, c, d] = [&parts[0], &parts[1 % PARTS], &parts[2 % PARTS], &parts[3 % PARTS]];
+        let mut picked = *a;
+        for k in 0..3 {
+            picked.inverse[k] = simd.pick([a.inverse[k], b.inverse[k], c.inverse[k], d.inverse[k]], places);
+            for side in 0..2 {
+                let biases = [a.bias[side][k], b.bias[side][k], c.bias[side][k], d.bias[side][k]];
+                picked.bias[side][k] = simd.pick(biases, places);
+            }
+            picked.origin[k] = simd.pick([a.origin[k], b.origin[k], c.origin[k], d.origin[k]], places);
+            picked.direction[k] = simd.pick([a.direction[k], b.direction[k], c.direction[k], d.direction[k]], places);
+        }
+        picked.tmin = simd.pick([a.tmin, b.tmin, c.tmin, d.tmin], places);
+        picked.tmax = simd.pick([a.tmax, b.tmax, c.tmax, d.tmax], places);
+        picked
     }
 
     /// Those that meet a child.
