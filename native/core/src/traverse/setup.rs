@@ -30,23 +30,6 @@ pub struct Frames<S: Arithmetic> {
 }
 
 impl<S: Arithmetic> Frames<S> {
-    /// No rays', to be overwritten.
-    #[inline(always)]
-    pub fn none(simd: S) -> Self {
-        let (zero, zeros) = (simd.splat(0.0), [simd.splat(0.0); 3]);
-        Self {
-            inverse: zeros,
-            near_bias: zeros,
-            far_bias: zeros,
-            tmin: zero,
-            tmax: zero,
-            local: zeros,
-            direction: zeros,
-            origin: zeros,
-            scale: zero,
-        }
-    }
-
     /// The frames of rays given by column: origin, direction, tmin, tmax. `None` where one of them is unusable
     /// or begins far away; then [`Frame::new`] is to be asked for each.
     #[inline(always)]
@@ -95,39 +78,6 @@ impl<S: Arithmetic> Frames<S> {
 }
 
 impl<S: Simd> Frames<S> {
-    /// Those of twice eight rays.
-    #[inline(always)]
-    pub fn halves(simd: S, frames: &Frames<S::Wide>) -> [Self; 2] {
-        let Frames { inverse, near_bias, far_bias, tmin, tmax, local, direction, origin, scale } = frames;
-        let (inverse, near_bias, far_bias) = (halves(simd, inverse), halves(simd, near_bias), halves(simd, far_bias));
-        let (local, direction, origin) = (halves(simd, local), halves(simd, direction), halves(simd, origin));
-        let (tmin, tmax, scale) = (simd.halves(*tmin), simd.halves(*tmax), simd.halves(*scale));
-        [
-            Self {
-                inverse: inverse[0],
-                near_bias: near_bias[0],
-                far_bias: far_bias[0],
-                tmin: tmin[0],
-                tmax: tmax[0],
-                local: local[0],
-                direction: direction[0],
-                origin: origin[0],
-                scale: scale[0],
-            },
-            Self {
-                inverse: inverse[1],
-                near_bias: near_bias[1],
-                far_bias: far_bias[1],
-                tmin: tmin[1],
-                tmax: tmax[1],
-                local: local[1],
-                direction: direction[1],
-                origin: origin[1],
-                scale: scale[1],
-            },
-        ]
-    }
-
     /// The frames one by one.
     #[inline(always)]
     pub fn store(&self, simd: S, frames: &mut [Frame; LANES]) {
@@ -175,13 +125,6 @@ fn beside<S: Simd>(simd: S, left: [S::F32; LANES], right: [S::F32; LANES]) -> [[
         rows[lane] = [simd.store(left[lane]), simd.store(right[lane])];
     }
     rows
-}
-
-/// Three vectors in halves.
-#[inline(always)]
-fn halves<S: Simd>(simd: S, [x, y, z]: &[<S::Wide as Arithmetic>::F32; 3]) -> [[S::F32; 3]; 2] {
-    let (x, y, z) = (simd.halves(*x), simd.halves(*y), simd.halves(*z));
-    [[x[0], y[0], z[0]], [x[1], y[1], z[1]]]
 }
 
 /// What frames have in the order of their axes.

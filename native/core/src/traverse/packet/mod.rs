@@ -37,10 +37,9 @@ use self::{
 };
 use super::{
     Tracer,
-    frame::{Domain, Frame},
+    frame::Frame,
     kernel::{self, Entry},
     probe::Silent,
-    setup::Frames,
     take::Take,
 };
 use crate::{
@@ -108,10 +107,10 @@ fn each_of<S: Simd, T: Take + ?Sized, const GRIDS: bool, const PARTS: usize>(
     let Tracer { structure, mesh, .. } = tracer;
     let scene = (structure, structure.view());
     let (size, domain) = (RAYS * PARTS, &structure.domain);
-    let mut frames = [Frames::none(simd.wide()); PARTS];
+    let mut packet = Packet::none(simd);
     for first in (0..rays.len()).step_by(size) {
-        if set(simd, &mut frames, (rays, first), domain) {
-            let hit = trace::<S, GRIDS, PARTS>(simd, scene, mesh, (&frames, rays, first), memory, stack);
+        if packet.set(simd, (rays, first), domain) {
+            let hit = trace::<S, GRIDS, PARTS>(simd, scene, mesh, (&packet, rays, first), memory, stack);
             for eight in (0..size).step_by(LANES) {
                 let mut hits = Eight::MISSES;
                 for lane in 0..LANES {
@@ -130,46 +129,24 @@ fn each_of<S: Simd, T: Take + ?Sized, const GRIDS: bool, const PARTS: usize>(
     Ok(())
 }
 
-/// Find the frames of the rays from `first` on; false where there are too few rays, or one has none. In place: to return
-/// them would copy some kilobytes.
-#[inline(always)]
-fn set<S: Simd, const PARTS: usize>(
-    simd: S,
-    frames: &mut [Frames<S::Wide>; PARTS],
-    (rays, first): (&Rays<'_>, usize),
-    domain: &Domain,
-) -> bool {
-    if first + RAYS * PARTS > rays.len() {
-        return false;
-    }
-    for part in 0..PARTS {
-        match Frames::new(simd.wide(), &rays.sixteen(simd, first + RAYS * part), domain) {
-            Some(found) => frames[part] = found,
-            None => return false,
-        }
-    }
-    true
-}
-
-/// Which of the rays from `first` on hit anything.
+/// Which rays of a packet, those of a batch's from `first` on, hit anything.
 #[inline(always)]
 fn trace<S: Simd, const GRIDS: bool, const PARTS: usize>(
     simd: S,
     (structure, root): (&Structure, View<'_>),
     mesh: &Mesh,
-    (frames, rays, first): (&[Frames<S::Wide>; PARTS], &Rays<'_>, usize),
+    (packet, rays, first): (&Packet<S, PARTS>, &Rays<'_>, usize),
     memory: &mut Memory,
     stack: &mut [Entry],
 ) -> u64 {
-    let packet = Packet::new(simd, frames, rays.origin(first), &structure.domain);
-    let Memory { visits, frames: written } = memory;
+    let Memory { visits, frames } = memory;
     visits.clear();
-    let apart = Apart { frames, written, are_written: 0 };
+    let apart = Apart { frames, are_written: 0 };
     let mut walk = Walk { simd, structure, mesh, batch: (rays, first), visits, apart, stack };
     let start = (root, structure.root);
     if S::IS_WIDE {
-        walk.below::<GRIDS, PARTS, Narrow>(&packet, start, packet.all())
+        walk.below::<GRIDS, PARTS, Narrow>(packet, start, packet.all())
     } else {
-        walk.below::<GRIDS, PARTS, Alone>(&packet, start, packet.all())
+        walk.below::<GRIDS, PARTS, Alone>(packet, start, packet.all())
     }
 }

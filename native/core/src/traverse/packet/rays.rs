@@ -2,6 +2,7 @@
 
 use crate::{
     accel::structure::Node,
+    ray::Rays,
     simd::{Arithmetic, Simd},
     traverse::{
         frame::{Domain, ROUNDING},
@@ -47,29 +48,47 @@ pub struct Part<S: Simd> {
 }
 
 impl<S: Simd, const PARTS: usize> Packet<S, PARTS> {
+    /// No rays, to be overwritten.
     #[inline(always)]
-    pub fn new(simd: S, frames: &[Frames<S::Wide>; PARTS], first: [f32; 3], domain: &Domain) -> Self {
-        let mut parts = [Part::new(simd.wide(), &frames[0]); PARTS];
-        let mut sides = sides(simd, &frames[0], first, domain);
-        for part in 1..PARTS {
-            parts[part] = Part::new(simd.wide(), &frames[part]);
-            let others = self::sides(simd, &frames[part], first, domain);
+    pub fn none(simd: S) -> Self {
+        let wide = simd.wide();
+        let (zero, zeros) = (wide.splat(0.0), [wide.splat(0.0); 3]);
+        let part = Part { inverse: zeros, bias: [zeros; 2], tmin: zero, tmax: zero, origin: zeros, direction: zeros };
+        let (first, sides, around, places) = Default::default();
+        Self { wide, parts: [part; PARTS], first, spread: 0.0, sides, around, places }
+    }
+
+    /// Take those of a batch's from `first` on; false where there are too few, or one has no frame. In place: to return it
+    /// would copy some kilobytes.
+    #[inline(always)]
+    pub fn set(&mut self, simd: S, (rays, first): (&Rays<'_>, usize), domain: &Domain) -> bool {
+        if first + RAYS * PARTS > rays.len() {
+            return false;
+        }
+        self.first = rays.origin(first);
+        let mut rows = [simd.splat(f32::INFINITY); LANES];
+        for part in 0..PARTS {
+            let Some(frames) = Frames::new(simd.wide(), &rays.sixteen(simd, first + RAYS * part), domain) else {
+                return false;
+            };
+            self.parts[part] = Part::new(simd.wide(), &frames);
+            let sides = sides(simd, &frames, self.first, domain);
             for k in 0..LANES {
-                sides[k] = simd.min(others[k], sides[k]);
+                rows[k] = simd.min(sides[k], rows[k]);
             }
         }
-        let rows = simd.transpose(sides);
+        let rows = simd.transpose(rows);
         let mut sides = rows[0];
         for lane in 1..LANES {
             sides = simd.min(rows[lane], sides);
         }
-        let sides = simd.store(sides);
-        let mut around = [0.0; 6];
+        self.sides = simd.store(sides);
+        self.spread = -self.sides[6];
         for k in 0..3 {
-            let local = first[k] - domain.centre[k];
-            (around[k], around[3 + k]) = (sides[k] - local, sides[3 + k] + local);
+            let local = self.first[k] - domain.centre[k];
+            (self.around[k], self.around[3 + k]) = (self.sides[k] - local, self.sides[3 + k] + local);
         }
-        Self { wide: simd.wide(), parts, first, spread: -sides[6], sides, around, places: [0; RAYS] }
+        true
     }
 
     /// Some rays of it, at most sixteen.

@@ -39,7 +39,7 @@ pub struct Walk<'a, S: Simd> {
     /// The rays of a batch, and where in it the packet begins.
     pub batch: (&'a Rays<'a>, usize),
     pub visits: &'a mut Vec<Visit>,
-    pub apart: Apart<'a, S>,
+    pub apart: Apart<'a>,
     pub stack: &'a mut [Entry],
 }
 
