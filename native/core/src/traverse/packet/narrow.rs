@@ -1,8 +1,9 @@
 //! Rays of a packet that are few enough for one vector, and go on below a node as a packet of their own. A packet of four
 //! vectors has seven to twenty-six rays left before a leaf, in whatever lanes, and tests all of its lanes.
 //!
-//! Against packets without (Zen 5, ambient occlusion) vianney, hospital and the room took 1/1.05 to 1/1.2 of the time; where streams are faster than packets, nothing
-//! changed. To find the box around the segments anew, for it may be smaller: as long (1/1.06 and 1/1.07 against before).
+//! Against packets without (Zen 5, ambient occlusion) vianney, hospital and the room took 1/1.05 to 1/1.2 of the time;
+//! where streams are faster than packets, nothing changed. To find the box around the segments anew, for it may be smaller:
+//! as long (1/1.06 and 1/1.07 against before).
 
 use super::{
     alone::Alone,
