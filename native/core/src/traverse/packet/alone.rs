@@ -20,7 +20,7 @@ use crate::{
 };
 
 /// The frames of rays that have gone on one by one, and of their neighbours. They are found again: to write those of every
-/// packet, six kilobytes, took 1.05 to 1.14 times as long in all (ambient occlusion in hospital, room and vianney, Zen 5).
+/// packet, six kilobytes, took 1.07 to 1.14 times as long in all (ambient occlusion in hospital, room and vianney, Zen 5).
 pub struct Apart<'a> {
     pub frames: &'a mut [Frame; MOST],
     /// A bit for every eight of them.
