@@ -30,12 +30,52 @@ impl Entry {
 
 /// A frame's constants in vectors, ready for node tests.
 struct Planes<S: Simd> {
-    near: [usize; 3],
-    far: [usize; 3],
+    sides: &'static [[Side; 3]; 2],
     inverse: [S::F32; 3],
     near_bias: [S::F32; 3],
     far_bias: [S::F32; 3],
     tmin: S::F32,
+}
+
+/// Where the planes of one side begin among the numbers of [`Node::plane`]. The compiler knows that no other number can
+/// stand here, and so takes no test of the index.
+#[derive(Debug, Clone, Copy)]
+#[repr(usize)]
+enum Side {
+    LowerX = 0,
+    LowerY = LANES,
+    LowerZ = 2 * LANES,
+    UpperX = 3 * LANES,
+    UpperY = 4 * LANES,
+    UpperZ = 5 * LANES,
+}
+
+/// For every octant, the sides that a ray meets first and those that it meets last, by axis.
+const SIDES: &[[[Side; 3]; 2]; 8] = &{
+    use Side::{LowerX, LowerY, LowerZ, UpperX, UpperY, UpperZ};
+    let (mut sides, mut octant) = ([[[LowerX, LowerY, LowerZ], [UpperX, UpperY, UpperZ]]; 8], 0);
+    while octant < 8 {
+        let mut axis = 0;
+        while axis < 3 {
+            if octant >> axis & 1 == 1 {
+                let [first, last] = sides[octant];
+                (sides[octant][0][axis], sides[octant][1][axis]) = (last[axis], first[axis]);
+            }
+            axis += 1;
+        }
+        octant += 1;
+    }
+    sides
+};
+
+impl Side {
+    /// Its planes.
+    #[inline(always)]
+    fn of(self, node: &Node) -> &[f32; LANES] {
+        let planes: &[f32; 6 * LANES] = bytemuck::cast_ref(&node.plane);
+        let (_, rest) = planes.split_at(self as usize);
+        rest.first_chunk().expect("a side is a whole one")
+    }
 }
 
 #[inline(always)]
@@ -43,18 +83,11 @@ fn splat<S: Simd>(simd: S, [x, y, z]: [f32; 3]) -> [S::F32; 3] {
     [simd.splat(x), simd.splat(y), simd.splat(z)]
 }
 
-/// Which of a node's planes a ray meets first along an axis.
-#[inline(always)]
-fn side(frame: &Frame, axis: usize) -> usize {
-    axis + 3 * usize::from(frame.inverse[axis] < 0.0)
-}
-
 impl<S: Simd> Planes<S> {
     #[inline(always)]
     fn new(simd: S, frame: &Frame) -> Self {
         Self {
-            near: [side(frame, 0), side(frame, 1), side(frame, 2)],
-            far: [3 - side(frame, 0), 5 - side(frame, 1), 7 - side(frame, 2)],
+            sides: &SIDES[frame.octant() & 7],
             inverse: splat(simd, frame.inverse),
             near_bias: splat(simd, frame.near_bias),
             far_bias: splat(simd, frame.far_bias),
@@ -67,8 +100,8 @@ impl<S: Simd> Planes<S> {
     fn meet(&self, simd: S, node: &Node, limit: f32) -> (u32, [f32; LANES]) {
         let (mut near, mut far) = (self.tmin, simd.splat(limit));
         for k in 0..3 {
-            let first = simd.load(&node.plane[self.near[k]]);
-            let last = simd.load(&node.plane[self.far[k]]);
+            let [first, last] = self.sides;
+            let (first, last) = (simd.load(first[k].of(node)), simd.load(last[k].of(node)));
             near = simd.max(simd.mul_add(first, self.inverse[k], self.near_bias[k]), near);
             far = simd.min(simd.mul_add(last, self.inverse[k], self.far_bias[k]), far);
         }

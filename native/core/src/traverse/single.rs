@@ -83,6 +83,8 @@ impl<const ANY: bool> One<'_, ANY> {
     #[inline(always)]
     fn each<S: Simd, const GRIDS: bool>(self, simd: S) -> Hit {
         let &Scene { structure, mesh, view, .. } = self.scene;
+        // Zeros that nobody reads: without them single rays took 1/1.03 of the time (a Xeon), but a frame that is kept from
+        // one ray to the next took 1.01 times as long, and one that is returned 1.5 times.
         let mut frame = Frame::zeroed();
         if !frame.set(self.ray, &structure.domain) {
             return Hit { t: f32::NAN, ..Hit::MISS };

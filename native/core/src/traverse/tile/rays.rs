@@ -135,7 +135,8 @@ impl Tile {
         let interval = (tmin[lane], tmax[lane]);
         let mut frame = Frame::zeroed();
         let (origin, place) = (Vec3A::from(self.origin), (self.local.into(), self.reach));
-        frame.set_near(origin, place, (direction, frame::inverse(direction, 1.0)), interval, &self.domain);
+        let directions = (direction, frame::inverse(direction, 1.0), direction.abs().max_element());
+        frame.set_near(origin, place, directions, interval, &self.domain);
         frame.scale = scale[lane];
         frame
     }
